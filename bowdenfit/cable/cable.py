@@ -42,7 +42,7 @@ class Cable:
         """The curve of each curved contact, by its column."""
         route = self.description.route
         return {
-            source.column: load_class(CURVES[source.curve].place)(source.column, route, source.departure == "smooth")
+            source.column: load_class(CURVES[source.curve].place)(source.column, route, self.description.departs(source))
             for source in (c.wrap_angle for c in self.description.contact)
             if route is not None and source.column is not None and source.curve is not None
         }

@@ -90,6 +90,7 @@ RESERVED_NAMES = ("chain", "draw", "optimal_length", "optimal_efficiency")
 """Columns that a file of draws has beside the coefficients, so that no coefficient can be called that."""
 
 _MOST_CONTACTS = 100  # judged: on-body cables have three; equal ones can be joined, because their wrap angles add up
+_DEPARTURE = {"continuous": "smooth", "published": "none"}  # of angles from their curves, where nothing is stated, by geometry
 _MOST_SETTINGS = 1000  # judged: more than one for each coefficient of each group
 AnySettings = TypeVar("AnySettings")
 
@@ -225,6 +226,10 @@ class Description(Display, Frozen):
     def coefficients(self) -> tuple[str, ...]:
         """Names of the friction coefficients, each once, in order of the contacts."""
         return tuple(dict.fromkeys(c.friction for c in self.contact))
+
+    def departs(self, angle: WrapAngle) -> bool:
+        """Whether an angle departs smoothly from its curve: unless stated otherwise or in the published geometry, it does."""
+        return angle.curve is not None and (angle.departure or _DEPARTURE[self.geometry]) == "smooth"
 
     @property
     def curved(self) -> tuple[Contact, ...]:

@@ -57,7 +57,7 @@ class WrapAngle(Frozen):
 
     curve: Choice | None = None
     column: Name | None = None
-    departure: Literal["smooth", "none"] = "none"
+    departure: Literal["smooth", "none"] | None = None
     published_range: tuple[Finite, Finite] | None = None
     nominal: QuantityValue | None = None
     value: NonNegative | None = None

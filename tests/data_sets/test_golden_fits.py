@@ -26,13 +26,21 @@ def test_every_shipped_data_set_has_a_golden_fit():
     assert sorted(GOLDEN) == sorted(path.parent.name for path in DATASETS.glob("*/cable.toml"))
 
 
+def least_squares(name):
+    """Least squares of a data set whose angles follow their curves exactly."""
+    contacts = bf.read(DATASETS / name).description.contact
+    curved = [number for number, contact in enumerate(contacts) if contact.wrap_angle.curve is not None]
+    settings = [f"contact.{number}.wrap_angle.departure=none" for number in curved]
+    return bf.fit(DATASETS / name, seed=1, mcmc=False, settings=settings)
+
+
 @pytest.mark.parametrize("name", GOLDEN)
-def test_least_squares_are_the_golden_ones(least_squares_of, name):
-    fit = least_squares_of(name)
+def test_least_squares_are_the_golden_ones(name):
+    fit = least_squares(name)
     assert fit.converged
     assert estimates(fit) == {parameter: value and pytest.approx(value, rel=1e-4) for parameter, value in GOLDEN[name].items()}
 
 
 if __name__ == "__main__":
-    fits = {path.parent.name: bf.fit(path.parent, seed=1, mcmc=False) for path in sorted(DATASETS.glob("*/cable.toml"))}
-    json.dump({name: estimates(fit) for name, fit in fits.items()}, sys.stdout, indent=1)
+    names = sorted(path.parent.name for path in DATASETS.glob("*/cable.toml"))
+    json.dump({name: estimates(least_squares(name)) for name in names}, sys.stdout, indent=1)

@@ -43,6 +43,7 @@ def _one_curve(folder: Path, column: str, limits: tuple[float, float], geometry:
     """The angle readings of one contact between two lengths, those below 10 deg taken for 0 as in the paper."""
     raw = _raw(folder)
     contact = next(c for c in raw["contact"] if c["wrap_angle"].get("column") == column)
+    contact["wrap_angle"]["departure"] = "none"
     if geometry == "published":
         contact["wrap_angle"]["published_range"] = limits
     else:

@@ -24,6 +24,7 @@ from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.models import build_model
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.store import posterior_page
+from fits import NO_DEPARTURES
 
 # model.md, section 8: mean, standard deviation; efficiencies only, continuous geometry. Two NUTS implementations agree.
 STATED = {
@@ -105,7 +106,7 @@ def bench(on_body) -> Bench:
 
 
 def first_bench(on_body: Path) -> Bench:
-    return Bench(LogDensity(build_model(bf.read(on_body, settings=FIRST_PRIORS))))
+    return Bench(LogDensity(build_model(bf.read(on_body, settings=(*FIRST_PRIORS, *NO_DEPARTURES)))))
 
 
 def drawn_by_nuts(bench: Bench) -> Draws:
@@ -155,7 +156,7 @@ def test_nuts_gives_the_moments_that_are_kept_of_it(bench, by_nuts):
 
 @pytest.fixture(scope="module")
 def by_bowdenfit(bench, on_body) -> Draws:
-    fit = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000", *FIRST_PRIORS])
+    fit = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000", *FIRST_PRIORS, *NO_DEPARTURES])
     assert fit.converged
     draws = bench.quantities(fit.posterior.flat_z)
     for name in ("mu1", "sigma_theta"):

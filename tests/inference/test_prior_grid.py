@@ -27,13 +27,15 @@ def test_a_chart_leads_back_and_knows_its_slopes():
     np.testing.assert_array_equal(computed[..., indices], z[..., indices])
 
 
-def test_coefficients_and_curvatures_are_charted_and_noise_scales_are_not(on_body):
+def test_coefficients_curvatures_and_departures_are_charted_and_noise_scales_are_not(on_body):
     """Levels and slopes of curves are linear in z as they are."""
     space = build_model(load_dataset(on_body)).space
     chart = make_prior_grid(space)
     charted = {space.free[i].name for i in chart.indices}
-    assert charted == {"mu1", "mu2", "mu3", "free_sheath_angle_c", "squeezed_sheath_angle_c"}
+    columns = ("free_sheath_angle", "squeezed_sheath_angle")
+    of_curves = {f"{column}_{ending}" for column in columns for ending in ("c", "departure_1", "departure_2")}
+    assert charted == {"mu1", "mu2", "mu3"} | of_curves
     z = np.repeat(np.asarray(NODES)[100:140:10, None], space.size, axis=1)
     values = jax.jit(lambda z: jnp.stack([p.prior.constrain(z[:, i]) for i, p in enumerate(space.free)], axis=1))(z)
     computed = jax.jit(chart.map_points)(z, True)[0]
-    np.testing.assert_allclose(computed[:, chart.indices], values[:, chart.indices], rtol=1e-9)
+    np.testing.assert_allclose(computed[:, chart.indices], values[:, chart.indices], rtol=1e-9, atol=1e-12)

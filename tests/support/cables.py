@@ -13,11 +13,18 @@ from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 ROUTE = {"variable": "cable_length", "unit": "mm", "range": [400, 600]}
+
+
+def _bell(column: str) -> dict[str, str]:
+    """Where the angle of a contact comes from that follows a bell exactly, without a departure."""
+    return {"curve": "gaussian", "column": column, "departure": "none"}
+
+
 CONTACTS: tuple[dict[str, Any], ...] = (
-    {"name": "free", "friction": "mu_free", "wrap_angle": {"curve": "gaussian", "column": "free_angle"}},
-    {"name": "squeezed", "friction": "mu_squeezed", "wrap_angle": {"curve": "gaussian", "column": "squeezed_angle"}},
+    {"name": "free", "friction": "mu_free", "wrap_angle": _bell("free_angle")},
+    {"name": "squeezed", "friction": "mu_squeezed", "wrap_angle": _bell("squeezed_angle")},
     {"name": "edge", "friction": "mu_edge", "wrap_angle": {"value": 45, "unit": "deg"}},
-    {"name": "second free", "friction": "mu_free", "wrap_angle": {"curve": "gaussian", "column": "second_angle"}},
+    {"name": "second free", "friction": "mu_free", "wrap_angle": _bell("second_angle")},
     {
         "name": "clamp",
         "friction": "mu_clamp",

@@ -11,6 +11,8 @@ from filelock import FileLock
 import bowdenfit as bf
 
 DATASETS = Path(__file__).resolve().parents[2] / "datasets"
+# Settings with which angles follow their curves exactly, of cables whose contacts with a curve come first.
+NO_DEPARTURES = tuple(f"contact.{number}.wrap_angle.departure=none" for number in range(2))
 
 
 def shared_folder(factory: pytest.TempPathFactory) -> Path:

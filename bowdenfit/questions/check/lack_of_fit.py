@@ -228,7 +228,7 @@ def _suggest_curve(fit: Record, column: str) -> str:
     family, smooth = contact.wrap_angle.curve, f"--set contact.{number}.wrap_angle.departure=smooth"
     others = [name for name in CURVES if name != family]
     fitting = [name for name in others if curve_family_fits(fit.dataset, number, name)]
-    if contact.wrap_angle.departure == "smooth":
+    if fit.dataset.description.departs(contact.wrap_angle):
         return (
             f"These angles depart from a {family} curve, and not smoothly either; narrow the range under [route] to where they "
             "do, or measure the angle with each run."

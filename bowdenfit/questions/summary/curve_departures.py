@@ -62,9 +62,9 @@ def _odds(fit: Record, curve: Curve) -> float:
     space = fit.model.space
     names = [name for name in curve.weight_names if name in space.index]
     columns = [space.index[name] for name in names]
-    drawn = np.asarray(fit.draws().z[..., columns]).reshape(-1, len(columns))
-    from_prior = np.random.default_rng(0).standard_normal((_N_PRIOR_DRAWS, len(columns)))
-    sizes, prior_sizes = (_root_mean_squares([space.free[i].prior for i in columns], z) for z in (drawn, from_prior))
+    posterior_z = fit.draws().flat_z[:, columns]
+    prior_z = np.random.default_rng(0).standard_normal((_N_PRIOR_DRAWS, len(columns)))
+    sizes, prior_sizes = (_root_mean_squares([space.free[i].prior for i in columns], z) for z in (posterior_z, prior_z))
     return float(np.mean(sizes < np.quantile(prior_sizes, _SMALL_PROBABILITY))) / _SMALL_PROBABILITY
 
 

@@ -54,19 +54,11 @@ def summarize(fit: Record) -> dict[str, Any]:
     Args:
         fit: The fit.
     """
-    fit_verdict = assess_fit(fit)
     page: dict[str, Any] = {
         "schema": SCHEMA,
         "name": fit.name,
         "geometry": fit.dataset.description.geometry,
-        "verdict": {
-            "converged": fit.converged,
-            "trusted": fit_verdict.trusted,
-            "usable": fit_verdict.may_be_used_for("design"),
-            "reasons": list(fit_verdict.reasons),
-            "doubts": list(fit_verdict.doubts),
-            "answers": fit_verdict.answers,
-        },
+        "verdict": _verdict_page(fit),
         "parameters": {p.name: _parameter_row(fit, p.name) for p in fit.model.space.parameters},
         "curves": {name: _curve_row(fit, name) for name in curve_coefficients(fit)},
         "least_squares": {
@@ -110,6 +102,19 @@ def summarize(fit: Record) -> dict[str, Any]:
             page["optimal"] = fit.optimal_length()
     everything: dict[str, Any] = plain_data(page)
     return everything
+
+
+def _verdict_page(fit: Record) -> dict[str, Any]:
+    """What may be used of a fit, and why the rest may not."""
+    fit_verdict = assess_fit(fit)
+    return {
+        "converged": fit.converged,
+        "trusted": fit_verdict.trusted,
+        "usable": fit_verdict.may_be_used_for("design"),
+        "reasons": list(fit_verdict.reasons),
+        "doubts": list(fit_verdict.doubts),
+        "answers": fit_verdict.answers,
+    }
 
 
 def _sampler_page(fit: Record, posterior: Draws) -> dict[str, Any]:

@@ -61,8 +61,8 @@ _LENGTH_TRUSTED = (
     "each other, and other coefficients that agree with them give the same."
 )
 _NUMBERS_TRUSTED = (
-    "You can trust these numbers: the fit has converged, and the readings agree with the model and with each other. They do "
-    "not tell yet which length is good enough."
+    "You can trust these numbers: the fit has converged, and the readings agree with the model and with each other. Which "
+    "length is good enough they do not show yet."
 )
 _TRUSTED_ALONE = "You can trust this: the fit has converged, and the reading agrees with the model."
 _IN_DOUBT = (

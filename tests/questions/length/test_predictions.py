@@ -48,7 +48,8 @@ def test_the_optimum_is_that_of_a_fine_grid(on_body, geometry):
     brute_length, brute_efficiency = _by_brute_force(model, z)
     if geometry == "continuous":
         step = 100 / (FINE - 1)
-        assert np.all(np.abs(length - brute_length) <= step + 1e-9)
+        equally_good = np.abs(efficiency - brute_efficiency) < 1e-12  # where departures leave a range without any bend
+        assert np.all((np.abs(length - brute_length) <= step + 1e-9) | equally_good)
         assert np.all(efficiency >= brute_efficiency - 1e-12)  # refined past the grid, so never worse
         assert np.sum((length > 431) & (length < 529)) > 10  # inside for many, and at an end for others
         assert np.any(is_at_edge(length, (430.0, 530.0)))
@@ -203,14 +204,12 @@ def test_efficiency_falls_off_with_the_friction_exponent_at_each_length(on_body_
     model, lengths = on_body_model, np.array([430.0, 471.3, 530.0])
     z = _draws(model, 5, 4)
     values = for_each_draw(value_function(model), model.space.size)(z)
-    angles = {
-        column: np.exp(
-            values[f"{column}_a"][:, None]
-            + values[f"{column}_b"][:, None] * (lengths - 480) / 50
-            - values[f"{column}_c"][:, None] * ((lengths - 480) / 50) ** 2
-        )
-        for column in ("free_sheath_angle", "squeezed_sheath_angle")
-    }
+    x, angles = (lengths - 480) / 50, {}
+    for column in ("free_sheath_angle", "squeezed_sheath_angle"):
+        endings = ("a", "b", "c", "departure_1", "departure_2")
+        a, b, c, second, third = (values[f"{column}_{ending}"][:, None] for ending in endings)
+        departure = second * np.sqrt(5) * (3 * x**2 - 1) / 2 + third * np.sqrt(7) * (5 * x**3 - 3 * x) / 2
+        angles[column] = np.maximum(np.exp(a + b * x - c * x**2) + np.deg2rad(departure), 0)
     exponent = (
         values["mu1"][:, None] * angles["free_sheath_angle"]
         + values["mu2"][:, None] * angles["squeezed_sheath_angle"]

@@ -98,7 +98,7 @@ def test_where_no_length_is_surely_good_enough_numbers_hold_but_not_the_design(o
     verdict = one_place.verdict()
     assert verdict.answers["best_length"] is False and not verdict.may_be_used_for("design")
     page = " ".join(summary_text(one_place).split())
-    assert "measure more before you cut" in page and "They do not tell yet which length is good enough." in page
+    assert "measure more before you cut" in page and "Which length is good enough they do not show yet." in page
 
 
 def test_predictions_rest_on_every_coefficient(hardly_any_short_bend):

@@ -124,6 +124,16 @@ def test_each_family_departs_and_is_itself_at_weights_of_0(family, tmp_path):
     assert np.min(smooth.cable.wrap_angles(departed, route)) == 0.0, "no negative angles"
 
 
+def test_angles_depart_unless_stated_otherwise_and_not_in_the_published_geometry(on_body):
+    def departing(*settings):
+        return [curve.departs for curve in build_model(bf.read(on_body, settings=settings)).cable.curves.values()]
+
+    assert departing() == [True, True]
+    assert departing("contact.1.wrap_angle.departure=none") == [True, False]
+    assert departing("geometry=published") == [False, False]
+    assert departing("geometry=published", "contact.0.wrap_angle.departure=smooth") == [True, False]
+
+
 def test_a_departure_needs_a_curve():
     contact = {"name": "c", "friction": "mu", "wrap_angle": {"column": "angle", "departure": "smooth"}}
     with pytest.raises(bf.BowdenfitError, match="belongs to a curve"):

@@ -35,6 +35,9 @@ def masked(text: str) -> str:
     # Which prior leads, and which follow, varies with quick draws too.
     first, remaining = r"(Interval widths depend on the prior of)", r"(Interval\s+widths\s+also\s+depend\s+on)"
     text = re.sub(rf"{first} \w+[ ,:].*?{remaining}\s+the\s+priors?\s+of\s.*?\.", r"\1 ... \2 ...", text, flags=re.S)
+    # Whether a bell's part has a width, and what its departure means, varies with quick draws too.
+    text = re.sub(r"(_angle_[ABC]) .*", r"\1 ...", text)
+    text = re.sub(r"root\s+mean\s+square;.*?\.", "root mean square; ...", text, flags=re.S)
     text = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", text)
     return re.sub(r"-{3,}", "---", re.sub(r"[ ]{2,}", "  ", text)).strip() + "\n"
 

@@ -26,7 +26,7 @@ from bowdenfit.files.channels import (
 )
 from bowdenfit.files.clocks import assign_rate_times
 from bowdenfit.files.headings import Heading, heading_of
-from bowdenfit.files.layout import Layout, find_layout, is_summary
+from bowdenfit.files.layout import Layout, choose_decimal, choose_separator, find_layout, is_summary
 from bowdenfit.files.pieces import never_falls
 from bowdenfit.files.row_account import ABOVE, BLANK, COMMENT, RowAccount, make_account
 from bowdenfit.files.sheet_columns import (
@@ -40,7 +40,6 @@ from bowdenfit.files.sheet_columns import (
     read_columns,
 )
 from bowdenfit.files.text_file import (
-    SEPARATORS,
     CsvRecord,
     Line,
     Section,
@@ -73,8 +72,6 @@ _LABVIEW_UNITS = "Y_Unit_Label"  # whose cells stand over the columns of the dat
 _CUT = "the file breaks off there"
 _FIRST_LINES = 300  # judged: in which headings and the first data must stand
 _HEADING_LINES = 12  # judged: lines over which a quoted heading may run
-# Equal readings of a file are decided by the order; "1,2" is two numbers before it is one with a decimal comma.
-_HABITS = (*((s, d) for s in SEPARATORS for d in ".," if (s, d) != (",", ",")), (",", ","))
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,6 @@ class Sheet:
         start: Where the data start [bytes].
         layout: Headings and kinds of the columns.
         metadata: The lines above the data.
-        headings: Rows of the headings and their units.
         above: Why the other rows above the data are not read, and what they say, by their numbers.
     """
 
@@ -98,7 +94,6 @@ class Sheet:
     start: int
     layout: Layout
     metadata: tuple[str, ...]
-    headings: tuple[int, ...]
     above: dict[int, tuple[str, str]]
 
 
@@ -247,47 +242,33 @@ def read_start(path: Path, data: bytes) -> Sheet:
     every = lines
     declared, lines = declared_separator(lines, path.name)
     texts = [line for line in lines if not comment_mark(line.text)]
-    rows = {s: list(split_records(texts, s, _HEADING_LINES)) for s in _possible_separators(texts, declared)}
-    readings = [(find_layout([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
-    layouts = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
-    if not layouts:
+    separator = declared or choose_separator(texts)
+    rows = list(split_records(texts, separator, _HEADING_LINES))
+    decimal = choose_decimal(rows)
+    layout = find_layout(rows, decimal, path.name)
+    if layout is None:
         raise DatasetError(
             f"{path.name} has no rows of numbers in columns; export the recording as CSV with one column for each signal."
         )
-    layout, separator, decimal = max(layouts, key=lambda reading: _score_layout(reading[0]))
-    below = rows[separator][layout.start :]
-    above = [line for line in lines if line.start < below[0].start]
+    first = layout.first
+    above = [line for line in lines if line.start < first.start]
+    below = [row for row in rows if row.start >= first.start]
     layout = _take_units_of_labview(_fit_layout(path, layout, below, separator, above), separator, above)
-    over = tuple(rows[separator][i].row for i in layout.over)
-    others = {line.row: _explain_row_above(line) for line in every if line.start < below[0].start and line.row not in over}
+    others = {
+        line.row: _explain_row_above(line) for line in every if line.start < first.start and line.row not in layout.over
+    }
     width = len(layout.kinds)
     for line in every:
         is_short = others.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width
         if is_short and holds_other_row(line.text, width):
             raise other_separator_error(path.name, line.row, line.text.strip())
-    return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
-
-
-def _score_layout(layout: Layout) -> tuple[bool, bool, int]:
-    """Return how much speaks for a reading: headings in words that have room for all columns, any such, and numbers."""
-    named = layout.named and layout.fits
-    return named and not layout.by_numbers, named, layout.score
+    return Sheet(encoding, separator, decimal, first.start, layout, tuple(line.text for line in above), others)
 
 
 def _explain_row_above(line: Line) -> tuple[str, str]:
     if is_blank(line.text):
         return BLANK, ""
     return (COMMENT, "") if comment_mark(line.text) else (ABOVE, " ".join(line.text.split()))
-
-
-def _possible_separators(lines: Sequence[Line], declared: str | None) -> list[str]:
-    """Return what may separate the columns; of those that stand nowhere, which all make one column, the first, and blanks."""
-    return [
-        separator
-        for separator in SEPARATORS
-        if declared in (None, separator)
-        and (separator in (declared, SEPARATORS[0], " ") or any(separator in line.text for line in lines))
-    ]
 
 
 def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:
@@ -343,7 +324,7 @@ def _account_rows(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[
     total = count_rows_before(path, size) + (0 if _ends_with_newline(path, size) else 1)
     if stop < size:
         reasons |= dict.fromkeys(range(count_rows_before(path, stop) + 1, total + 1), (_CUT, ""))
-    return make_account(path.name, total, sheet.headings, reasons, columns.beside)
+    return make_account(path.name, total, sheet.layout.over, reasons, columns.beside)
 
 
 def _ends_with_newline(path: Path, size: int) -> bool:

@@ -81,16 +81,16 @@ def _read_sheet(
 ) -> tuple[tuple[Channel, ...], list[str], RowAccount | None]:
     iterator = iter(cells)
     first = list(islice(iterator, _FIRST_ROWS))
-    layout = find_layout([[cell_text(cell) for cell in row] for row in first], ".")
+    records = [CsvRecord(i, 0, [cell_text(cell) for cell in row]) for i, row in enumerate(first, start=1)]
+    layout = find_layout(records, ".", place)
     if layout is None:
         return (), [], None
-    start = layout.start
+    start = layout.first.row - 1
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
     columns = read_columns(rows)
     channels, left_out = make_channels(layout, columns)
-    above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
-    over = [i + 1 for i in layout.over]
-    account = make_account(file, start + columns.rows, over, above | columns.left_out, columns.beside)
+    above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i + 1 not in layout.over}
+    account = make_account(file, start + columns.rows, layout.over, above | columns.left_out, columns.beside)
     return channels, [*left_out, *columns.remarks], account
 
 

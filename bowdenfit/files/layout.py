@@ -1,53 +1,244 @@
-"""Where the numbers of a sheet begin and what stands over them, seen from its first rows."""
+"""Where the headings and the data of a sheet are, for tables and recordings alike.
+
+`choose_separator` divides lines into cells; `find_headings` finds the row of headings, by the numbers below it, with the groups
+over it and the units under it; `find_layout` says for a recording what its columns hold and where they begin.
+"""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from bowdenfit.files.cells import Kind, classify_cell, parse_number
+from bowdenfit.files.cells import MISSING, Kind, classify_cell, parse_number
 from bowdenfit.files.clocks import names_time
-from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row
+from bowdenfit.files.headings import (
+    Heading,
+    heading_of,
+    is_number,
+    is_units_row,
+    plain_name,
+    refuse_two_units,
+    strip_brackets,
+)
+from bowdenfit.files.measured_cells import is_measured, is_reading
+from bowdenfit.files.text_file import SEPARATORS, CsvRecord, Line, split_records
 from bowdenfit.types import Vector
 
-Rows = Sequence[Sequence[str]]
 _SUMMARY = re.compile(
     r"(?:(?:min|max|avg|average|mean|std|stdev|stddev|sd|sem|median|rms|sum|total|count|range|half range|peak|variance|"
     r"minimum|maximum|mittelwert|summe|anzahl|moyenne|media|standard deviation|standardabweichung)[\s:.=]*)",
     re.IGNORECASE,
 )
+_TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
+_KINDS: tuple[Kind, ...] = ("number", "date", "text")
+_NEAR_TOP = 60  # judged: rows in which headings are looked for
+_FIRST_ROWS = 300  # judged: rows by which the separator is chosen
 _STEPS = 60  # judged: rows that are enough to see a clock rise in even steps
 _UNEVEN = 3.0  # judged: largest step of a clock over its smallest
+_FEWEST_ROWS = 4  # judged: rows from which one of numbers may be the headings of the others
+
+
+def count_words_and_numbers(row: CsvRecord, test: Callable[[str], bool] = is_measured) -> tuple[int, int]:
+    """Return how many cells hold words, and how many numbers; marks for nothing are neither."""
+    filled = [cell for cell in row.cells if cell.strip()]
+    numbers = sum(map(test, filled))
+    return sum(cell.strip().lower() not in MISSING for cell in filled) - numbers, numbers
+
+
+def is_words(row: CsvRecord, least: int = 2) -> bool:
+    """Return whether a row can be one of headings: nothing but words, or numbers with a unit."""
+    words, numbers = count_words_and_numbers(row, is_bare_number)
+    return not numbers and words >= least
+
+
+def is_bare_number(text: str) -> bool:
+    """Return whether a cell holds a number without a unit or an error, as no heading does."""
+    return is_measured(text) and not is_reading(text)
+
+
+def is_units(row: CsvRecord) -> bool:
+    """Return whether a row holds nothing but units."""
+    return not count_words_and_numbers(row)[1] and is_units_row(row.cells)
+
+
+def is_same(row: CsvRecord, header: CsvRecord) -> bool:
+    """Return whether a row has the headings again, in whatever spelling of letters and spaces."""
+    return [plain_name(cell) for cell in row.cells] == [plain_name(cell) for cell in header.cells]
+
+
+def is_summary(cells: Sequence[str]) -> bool:
+    """Return whether a row below the data is one of minima, averages and the like."""
+    return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
+
+
+def choose_separator(lines: Sequence[Line]) -> str:
+    """Return what separates the columns of some lines: the separator by which headings fit and most cells are numbers."""
+    first = lines[:_FIRST_ROWS]
+    text = "".join(line.text for line in first)
+    return max((s for s in SEPARATORS if s in (SEPARATORS[0], " ") or s in text), key=lambda s: _score_separator(first, s))
+
+
+def _score_separator(lines: Sequence[Line], separator: str) -> tuple[bool, int, bool, bool, int]:
+    """Return how well a separator splits rows: headings over all numbers, most numbers, equally many cells, most cells.
+
+    Blanks, which stand in headings too, separate columns only where nothing else does.
+    """
+    rows = [row for row in split_records(lines, separator, len(lines)) if not row.blank]
+    numbers = _count_numbers(rows, separator)
+    position = _header_position(rows) if numbers > 0 else None
+    room = len(rows[position].cells) if position is not None else 0
+    fits = position is not None and not any(is_measured(cell) for row in rows[position:] for cell in row.cells[room:])
+    widths = [len(row.cells) for row in rows] or [0]
+    alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
+    return fits, numbers, separator != " ", alike, widths[0]
+
+
+def _count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
+    """Return how many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
+
+    Blanks, which separate words too, count for less by every word between them.
+    """
+    total = 0
+    for row in rows:
+        filled = [cell for cell in row.cells if cell.strip()]
+        numbers = sum(map(is_measured, filled))
+        wrong = filled if separator == " " else list(filter(_TOGETHER.search, filled))
+        total += numbers - sum(not is_measured(cell) for cell in wrong) * (1 if separator == " " else 2)
+    return total
+
+
+def choose_decimal(rows: Sequence[CsvRecord]) -> str:
+    """Return the decimal mark by which most cells are numbers."""
+    cells = [cell for row in rows for cell in row.cells]
+    return max(".,", key=lambda mark: sum(parse_number(cell, mark) is not None for cell in cells))
+
+
+@dataclass(frozen=True)
+class Headings:
+    """The headings of a sheet.
+
+    Args:
+        rows: The rows that hold headings and their units, from above.
+        header: Of these the one that names the columns.
+        names: Heading of each column, behind that of its group.
+        units: The unit below each name; empty without one.
+
+    """
+
+    rows: tuple[CsvRecord, ...]
+    header: CsvRecord
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+def find_headings(rows: Sequence[CsvRecord], place: str, groups: bool = True) -> Headings | None:
+    """Return the headings of a sheet by all its rows, or the first of them; None where no row of words stands over numbers.
+
+    Args:
+        rows: The rows that are no comments.
+        place: File, and sheet where it has several.
+        groups: Whether words over headings that repeat themselves belong to them, as numbers always do.
+
+    Raises:
+        DatasetError: A unit below a heading is another than the one in it.
+    """
+    filled = [row for row in rows if not row.blank]
+    position = _header_position(filled)
+    return None if position is None else read_headings(filled, position, place, groups)
+
+
+def _header_position(filled: Sequence[CsvRecord]) -> int | None:
+    """Return which of the rows holds the headings: that of words alone over most numbers; None where there is none."""
+    widest = max((len([cell for cell in row.cells if cell.strip()]) for row in filled), default=0)
+    least = 2 if widest > 1 else 1
+    best: int | None = None
+    current: int | None = None
+    most = score = 0
+    for i, row in enumerate(filled):
+        words = i < _NEAR_TOP and is_words(row, least) and not _has_units_as_neighbors(filled, i)
+        below = current is not None and (is_same(row, filled[current]) or (i == current + 1 and is_units(row)))
+        if words and not below:
+            current, score = i, 0
+        elif current is not None:
+            score += count_words_and_numbers(row)[1]
+            if score > most:
+                best, most = current, score
+    return best
+
+
+def _has_units_as_neighbors(filled: Sequence[CsvRecord], i: int) -> bool:
+    """Return whether a row has numbers with units or errors where a row next to it has them, as rows of readings do.
+
+    A row of headings may have them too, such as 45° and 90° over forces.
+    """
+    columns = {k for k, cell in enumerate(filled[i].cells) if is_reading(cell)}
+    neighbors = [filled[k] for k in (i - 1, i + 1) if 0 <= k < len(filled)] if columns else []
+    return any(is_reading(row.cells[k]) for row in neighbors for k in columns if k < len(row.cells))
+
+
+def read_headings(filled: Sequence[CsvRecord], position: int, place: str, groups: bool = True) -> Headings:
+    """Return the headings in one of the rows that are not blank, with the units below and, with `groups`, any words above.
+
+    Raises:
+        DatasetError: A unit below a heading is another than the one in it.
+    """
+    header = filled[position]
+    rows, units = [header], list[str]()
+    if position + 1 < len(filled) and is_units(filled[position + 1]):
+        below = filled[position + 1]
+        rows.append(below)
+        units = [strip_brackets(cell) for cell in below.cells]
+        refuse_two_units(f"{place}, row {below.row}", header.cells, units)
+    names = [" ".join(cell.split()) for cell in header.cells]
+    if position and _is_over(filled[position - 1], names, groups):
+        names = _join_groups(drop_label(filled[position - 1].cells), names)
+        rows.insert(0, filled[position - 1])
+    return Headings(tuple(rows), header, tuple(names), tuple(units))
+
+
+def _is_over(above: CsvRecord, names: Sequence[str], groups: bool) -> bool:
+    """Return whether a row is a first row of headings, over others that are numbers alone or of which two are the same."""
+    written = [name.lower() for name in names if name]
+    is_repeated, are_numbers = len(set(written)) < len(written), all(map(is_number, written))
+    if all(is_number(cell) for cell in drop_label(above.cells) if cell.strip()):
+        return len(above.cells) > 1 and (is_repeated or are_numbers)
+    return len(above.cells) > 1 and is_repeated and groups and is_words(above, 1)
+
+
+def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return headings with the group before them that stands over the first of its columns, as merged cells are exported.
+
+    A column that has a heading in the upper row alone, such as the time beside groups of runs, keeps that.
+    """
+    upper = [" ".join(cell.split()) for cell in (*above, *[""] * len(names))][: len(names)]
+    joined, group = list[str](), ""
+    for name, cell in zip(names, upper, strict=True):
+        group = cell or group
+        joined.append(f"{group} {name}".strip() if name else cell)
+    return joined
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What a sheet holds and where.
+    """What the columns of a recording hold and where they begin.
 
     Args:
-        start: Position of the first row of data.
+        first: The first row of data.
         headings: One for each column; `named` says whether the file gave them.
         kinds: Kind of the cells of each column.
         named: Whether there is a row of headings.
-        score: How much speaks for this reading of the sheet: the number of cells that are numbers.
         heading_cells: Number of cells in the row of headings.
-        over: Positions of the rows of headings and units.
-        by_numbers: Whether the headings are a row of numbers, which may be data.
-        names, units: Heading of each column, and its unit in a row of units below that; empty if there is none.
+        over: Numbers of the rows of headings and units.
     """
 
-    start: int
+    first: CsvRecord
     headings: tuple[Heading, ...]
     kinds: tuple[Kind, ...]
-    named: bool
-    score: int
+    named: bool = False
     heading_cells: int = 0
     over: tuple[int, ...] = ()
-    by_numbers: bool = False
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
 
     @property
     def room(self) -> int:
@@ -70,45 +261,59 @@ class Layout:
         return self.headings[column].name or f"column{column + 1}"
 
 
-def find_layout(rows: Rows, decimal: str) -> Layout | None:
-    """Return how the first rows of a sheet are laid out; None if they hold no data.
+def find_layout(rows: Sequence[CsvRecord], decimal: str, place: str) -> Layout | None:
+    """Return how the columns of a recording are laid out, by its first rows; None if they hold no data.
 
-    The data are the longest run of rows that agree on which columns are numbers. A row of whole numbers at its top
-    counts as headings where no other headings stand and the clocks below it say so.
+    Headings may be numbers: those in a row with a label before them, and whole ones right over the data where the clocks below
+    say so.
+
+    Raises:
+        DatasetError: A unit below a heading is another than the one in it.
     """
-    kinds = [[classify_cell(cell, decimal) for cell in row] for row in rows]
-    start, stop, score = _longest_run(kinds, [is_summary(row) for row in rows])
-    if score <= 0:
+    headings = find_headings(rows, place, groups=False)
+    above = headings.rows[-1].row if headings else 0
+    data = [row for row in rows if row.row > above and _is_data(row, decimal)]
+    if not data:
         return None
-    start = _below_headings(rows, kinds, start)
-    width = max(len(row) for row in rows[start:stop])
-    header, units, over = _header_rows(rows, start, stop)
-    by_numbers = not header and _is_numeric_heading(rows[start:stop], kinds[start:stop], decimal)
-    if by_numbers:
-        header, over, start = [rows[start]], [start], start + 1
-    columns = tuple(_kind_of_column(kinds[start:stop], i) for i in range(width))
-    rising = [_rises(rows[start:stop], i, decimal) for i in range(width)]
-    if not header:
-        return Layout(start, tuple(Heading(f"column{i + 1}") for i in range(width)), columns, False, score)
-    names = _join_headings([drop_label(row) for row in header], width)
-    written = [heading_of(name, unit) for name, unit in zip(names, [*units, *[""] * width], strict=False)][:width]
-    return Layout(
-        start,
-        pair_clocks(written, rising, [kind == "number" for kind in columns]),
-        columns,
-        True,
-        score,
-        max(map(len, header)),
-        tuple(over),
-        by_numbers,
-        tuple(names),
-        tuple(units),
-    )
+    if headings:  # a row of words among the data counts too
+        data = [row for row in rows if above < row.row <= data[-1].row and not row.blank and not is_summary(row.cells)]
+    kinds = _kinds_of_columns(data, decimal)
+    width = sorted(map(_filled_width, data))[len(data) // 2]
+    if headings is None or not _can_head(headings.header, width):
+        return _find_layout_by_numbers(rows, data, kinds, decimal, place)
+    first = next(row for row in rows if row.row > headings.rows[-1].row and not row.blank)
+    return _name_columns(first, headings, data, kinds, decimal)
 
 
-def is_summary(cells: Sequence[str]) -> bool:
-    """Return whether a row below the data is one of minima, averages and the like."""
-    return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
+def _find_layout_by_numbers(
+    rows: Sequence[CsvRecord], data: Sequence[CsvRecord], kinds: Sequence[Kind], decimal: str, place: str
+) -> Layout:
+    """Return the layout of a sheet without headings in words: numbers over the columns are its headings, or there are none."""
+    start = next((i for i, row in enumerate(data) if _agrees(row, kinds, decimal)), 0)
+    first, data = data[start], data[start:]
+    above = [replace(row, cells=drop_label(row.cells)) for row in rows if row.row < first.row and not row.blank]
+    if not (above and _can_head(above[-1], len(kinds))):
+        if not _is_numeric_heading(data, decimal):
+            return Layout(first, tuple(Heading(f"column{i + 1}") for i in range(len(kinds))), tuple(kinds))
+        above, data, first = [*above, first], data[1:], data[1]
+    headings = read_headings(above, len(above) - 1, place)
+    return _name_columns(first, headings, data, kinds, decimal)
+
+
+def _name_columns(
+    first: CsvRecord,
+    headings: Headings,
+    data: Sequence[CsvRecord],
+    kinds: Sequence[Kind],
+    decimal: str,
+) -> Layout:
+    """Return the layout of columns under their headings, in which nameless clocks have a name."""
+    written = [heading_of(*pair) for pair in zip_longest(headings.names, headings.units[: len(headings.names)], fillvalue="")]
+    named = (*written, *[Heading("")] * len(kinds))[: len(kinds)]
+    rising = [_rises(data, i, decimal) for i in range(len(kinds))]
+    paired = pair_clocks(named, rising, [kind == "number" for kind in kinds])
+    cells = max(len(row.cells) for row in headings.rows)
+    return Layout(first, paired, tuple(kinds), True, cells, tuple(row.row for row in headings.rows))
 
 
 def is_index(values: Vector) -> bool:
@@ -116,114 +321,52 @@ def is_index(values: Vector) -> bool:
     return len(values) > 1 and values[0] in (0, 1) and bool(np.all(values[1:] == values[:-1] + 1))
 
 
-def _longest_run(kinds: Sequence[Sequence[Kind]], summaries: Sequence[bool]) -> tuple[int, int, int]:
-    """Return start, stop and score of the rows that agree on their columns and hold most numbers."""
-    best, start, score = (0, 0, 0), 0, 0
-    for i, row in enumerate(kinds):
-        worth = sum(1 if kind in ("number", "date") else -1 for kind in row if kind != "blank")
-        blank = all(kind == "blank" for kind in row)
-        worth = 0 if summaries[i] else worth
-        if (worth <= 0 and not blank) or (i > start and not _agree(_last_filled(kinds, start, i), row)):
-            start, score = (i, worth) if worth > 0 else (i + 1, 0)
-        else:
-            score += worth
-            start = i if score == 0 else start
-        best = max(best, (start, i + 1, score), key=lambda run: run[2])
-    return best
+def _is_data(row: CsvRecord, decimal: str) -> bool:
+    """Return whether a row holds more numbers and dates than words, and no statistics."""
+    kinds = [classify_cell(cell, decimal) for cell in row.cells]
+    return kinds.count("number") + kinds.count("date") > kinds.count("text") and not is_summary(row.cells)
 
 
-def _below_headings(rows: Rows, kinds: Sequence[Sequence[Kind]], start: int) -> int:
-    """Return where the data start that agree from `start` on: below the headings, if only data with bad cells are between.
-
-    A bad cell, a remark or the headings once more near the top would else make a heading of the row that has it.
-    """
-    numeric = [i for i, kind in enumerate(kinds[start]) if kind in ("number", "date")]
-    first = start
-    for i in range(start - 1, -1, -1):
-        filled = [cell for cell in rows[i] if cell.strip()]
-        if not filled or (first < start and is_units_row(rows[i])):
-            continue
-        if any(k < len(kinds[i]) and kinds[i][k] in ("number", "date") for k in numeric):
-            if first == start and drop_label(rows[i]) != list(rows[i]):
-                return start
-            first = i
-        elif len(filled) >= max(len(numeric), 2) and list(rows[i]) not in [list(row) for row in rows[:i]]:
-            return first
-    return start
+def _agrees(row: CsvRecord, columns: Sequence[Kind], decimal: str) -> bool:
+    """Return whether the cells of a row are of the kinds that the columns have."""
+    kinds = [classify_cell(cell, decimal) for cell in row.cells]
+    return all("blank" in pair or pair[0] == pair[1] for pair in zip(kinds, columns, strict=False))
 
 
-def _last_filled(kinds: Sequence[Sequence[Kind]], start: int, stop: int) -> Sequence[Kind]:
-    return next((kinds[i] for i in range(stop - 1, start - 1, -1) if set(kinds[i]) - {"blank"}), [])
+def _kinds_of_columns(data: Sequence[CsvRecord], decimal: str) -> list[Kind]:
+    """Return the kind that most cells of each column have, blank ones aside."""
+    columns = zip_longest(*(row.cells for row in data), fillvalue="")
+    of_cells: list[list[Kind]] = [[classify_cell(cell, decimal) for cell in column] for column in columns]
+    return [max(_KINDS, key=kinds.count) if {*kinds} - {"blank"} else "blank" for kinds in of_cells]
 
 
-def _agree(above: Sequence[Kind], below: Sequence[Kind]) -> bool:
-    return all(a == b or "blank" in (a, b) for a, b in zip(above, below, strict=False))
-
-
-def _header_rows(rows: Rows, start: int, stop: int) -> tuple[list[Sequence[str]], list[str], list[int]]:
-    """Return the rows of headings right over the data, from above, the units below them, and the positions of all."""
-    above = [i for i in range(start) if any(cell.strip() for cell in rows[i])]
-    width = sorted(map(_filled_width, rows[start:stop]))[(stop - start) // 2]
-    units: list[str] = []
-    places: list[int] = []
-    if len(above) > 1 and is_units_row(rows[above[-1]]) and _is_over_units(rows[above[-2]], width):
-        units = [cell.strip() for cell in rows[above[-1]]]
-        places, above = above[-1:], above[:-1]
-    header: list[Sequence[str]] = []
-    below: list[int] = []
-    for i in reversed(above):
-        over = [cell for cell in drop_label(rows[i]) if cell.strip()]
-        second = bool(header) and not (len(over) > 1 and all(map(is_number, over)) and [i + 1] == below)
-        if second or not _is_heading(rows[i], width):
-            break
-        below = [i]
-        header = [rows[i], *header]
-        places = [i, *places]
-    return header, units, places
-
-
-def _is_heading(row: Sequence[str], width: int) -> bool:
+def _can_head(row: CsvRecord, width: int) -> bool:
     """Return whether a row can stand over that many columns: metadata have two cells, headings about as many as the data."""
-    return len(row) * 2 >= width and (width == 1 or len(row) > 1)
+    return len(row.cells) * 2 >= width and (width == 1 or len(row.cells) > 1)
 
 
-def _is_over_units(row: Sequence[str], width: int) -> bool:
-    """Return whether headings stand over a line of units: all words or all numbers, unlike a line such as "Rate", 1000."""
-    return _is_heading(row, width) and len({is_number(cell) for cell in row if cell.strip()}) == 1
+def _filled_width(row: CsvRecord) -> int:
+    return max((i + 1 for i, cell in enumerate(row.cells) if cell.strip()), default=0)
 
 
-def _filled_width(row: Sequence[str]) -> int:
-    return max((i + 1 for i, cell in enumerate(row) if cell.strip()), default=0)
-
-
-def _is_numeric_heading(rows: Rows, kinds: Sequence[Sequence[Kind]], decimal: str) -> bool:
-    first = rows[0]
-    if len(rows) < 4 or not all(is_number(cell) for cell in first if cell.strip()):
+def _is_numeric_heading(data: Sequence[CsvRecord], decimal: str) -> bool:
+    """Return whether the first row of data, of whole numbers, is one of headings: a column has none, or rises evenly below."""
+    first = data[0].cells
+    filled = [cell for cell in first if cell.strip()]
+    if len(data) < _FEWEST_ROWS or not all(map(is_number, filled)):
         return False
-    bare = any(a == "blank" and b == "number" and not first[i].strip() for i, (a, b) in enumerate(zip(*kinds[:2])))  # noqa: B905
-    whole = all(float(cell.replace(",", ".")).is_integer() for cell in first if cell.strip())
-    jumps = [_rises(rows[1:], i, decimal) and not _rises(rows, i, decimal) for i in range(len(first))]
+    whole = all(float(cell.replace(",", ".")).is_integer() for cell in filled)
+    bare = any(not a.strip() and classify_cell(b, decimal) == "number" for a, b in zip(first, data[1].cells, strict=False))
+    jumps = (_rises(data[1:], i, decimal) and not _rises(data, i, decimal) for i in range(len(first)))
     return whole and (bare or any(jumps))
 
 
-def _rises(rows: Rows, column: int, decimal: str) -> bool:
+def _rises(data: Sequence[CsvRecord], column: int, decimal: str) -> bool:
     """Return whether the column rises in even steps."""
-    cells = (parse_number(row[column], decimal) for row in rows[:_STEPS] if column < len(row))
+    cells = (parse_number(row.cells[column], decimal) for row in data[:_STEPS] if column < len(row.cells))
     values = [value for value in cells if value is not None and value == value]
     steps = [after - before for before, after in pairwise(values)]
     return len(steps) > 1 and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
-
-
-def _kind_of_column(kinds: Sequence[Sequence[Kind]], column: int) -> Kind:
-    filled = [row[column] for row in kinds if column < len(row) and row[column] != "blank"]
-    return max(set(filled), key=filled.count) if filled else "blank"
-
-
-def _join_headings(header: Sequence[Sequence[str]], width: int) -> list[str]:
-    """Return one name a column out of one or more rows of headings."""
-    width = max(width, *map(len, header))
-    padded = [[*row, *[""] * (width - len(row))] for row in header]
-    return [" ".join(" ".join(cells).split()) for cells in zip(*padded, strict=True)]
 
 
 def drop_label(cells: Sequence[str]) -> list[str]:

@@ -66,6 +66,12 @@ def is_reading(text: str) -> bool:
     return split_measured(text) is not None
 
 
+@lru_cache(1 << 14)  # it is asked of every cell again and again, and many cells hold the same
+def is_measured(text: str) -> bool:
+    """Return whether a cell holds what a table measures: a number with or without a unit, a percentage, a limit such as <10."""
+    return is_plain_number(text.strip().rstrip("%").lstrip("<≤=")) or is_reading(text)
+
+
 def _is_usual(unit: str) -> bool:
     """Return whether tables measure something in a unit, so that "1 A" stays the label that it usually is."""
     if len(unit) == 1 and unit not in _SINGLE_LETTERS:

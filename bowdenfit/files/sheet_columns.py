@@ -18,7 +18,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, classify_cell, parse_number
 from bowdenfit.files.channels import Channel, make_names_unique
 from bowdenfit.files.clocks import assign_clocks, parse_dates, trim_tails
-from bowdenfit.files.headings import heading_of, refuse_two_units
+from bowdenfit.files.headings import heading_of
 from bowdenfit.files.layout import Layout, is_index, is_summary
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
 from bowdenfit.files.text_file import holds_other_row, other_separator_error, refuse_long_row
@@ -128,7 +128,6 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
-    refuse_two_units(sheet.place, sheet.layout.names, sheet.layout.units)
     kinds, cells = sheet.layout.kinds, read_cells(sheet)
     stop = _data_end(bytes(cells.letters))
     left_out, beside = _explain_left_out(sheet, cells, stop), []

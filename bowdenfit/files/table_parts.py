@@ -4,21 +4,25 @@ The headings are decided once, near the top, by what stands below them: a bad ce
 The table ends where rows stop to agree with its columns; a block of text below it starts behind a blank row.
 """
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.cells import BLANK, is_plain_number
-from bowdenfit.files.headings import is_units_row, plain_name, refuse_two_units, strip_brackets
-from bowdenfit.files.layout import is_summary
-from bowdenfit.files.measured_cells import is_reading
+from bowdenfit.files.cells import BLANK
+from bowdenfit.files.layout import (
+    count_words_and_numbers,
+    find_headings,
+    is_bare_number,
+    is_same,
+    is_summary,
+    is_units,
+    is_words,
+    read_headings,
+)
+from bowdenfit.files.measured_cells import is_measured
 from bowdenfit.files.row_account import ABOVE, AGAIN, BELOW, BETWEEN
 from bowdenfit.files.text_file import SEPARATORS, CsvRecord, other_separator_error, split_cells
 from bowdenfit.words import shown
-
-_NEAR_TOP = 60  # judged: rows in which headings are looked for
 
 
 @dataclass(frozen=True)
@@ -77,71 +81,13 @@ def _find_gap(rows: Sequence[CsvRecord]) -> int | None:
 
 def _split_columns(rows: Sequence[CsvRecord], file: str) -> TableParts:
     filled = [row for row in rows if not row.blank]
-    at = _header_position(filled)
-    over, below = [filled[at]], at + 1
-    units: list[str] = []
-    if below < len(filled) and is_units(filled[below]):
-        units = [strip_brackets(cell) for cell in filled[below].cells]
-        over.append(filled[below])
-        refuse_two_units(f"{file}, row {filled[below].row}", filled[at].cells, units)
-    names = [" ".join(cell.split()) for cell in filled[at].cells]
-    if at and _is_over(filled[at - 1], names):
-        names = _join_groups(filled[at - 1].cells, names)
-        over.insert(0, filled[at - 1])
-    reasons = {row.row: ABOVE for row in filled[:at] if row not in over}
-    _check_above(filled[:at], sum(map(bool, names)), filled[at], file)
-    body, left_out = select_readings([row for row in rows if row.row > over[-1].row], filled[at], file)
-    return TableParts(tuple(over), filled[at], tuple(names), tuple(units), tuple(body), reasons | left_out)
-
-
-def _header_position(filled: Sequence[CsvRecord]) -> int:
-    """Return which of the rows holds the headings: that of words alone over most numbers; the first where there is none."""
-    widest = max((len([cell for cell in row.cells if cell.strip()]) for row in filled), default=0)
-    least = 2 if widest > 1 else 1
-    best, most, current = 0, 0, -1
-    score = 0
-    for i, row in enumerate(filled):
-        words = i < _NEAR_TOP and is_words(row, least) and not _has_units_as_neighbors(filled, i)
-        below = current >= 0 and (_is_same(row, filled[current]) or (i == current + 1 and is_units(row)))
-        if words and not below:
-            current, score = i, 0
-        elif current >= 0:
-            score += count_words_and_numbers(row)[1]
-            if score > most:
-                best, most = current, score
-    return best
-
-
-def _has_units_as_neighbors(filled: Sequence[CsvRecord], i: int) -> bool:
-    """Return whether a row has numbers with units or errors where a row beside it has them, as rows of readings do.
-
-    A row of headings may have them too, such as 45° and 90° over forces.
-    """
-    here = {k for k, cell in enumerate(filled[i].cells) if is_reading(cell)}
-    beside = [filled[k] for k in (i - 1, i + 1) if 0 <= k < len(filled)] if here else []
-    return any(is_reading(row.cells[k]) for row in beside for k in here if k < len(row.cells))
-
-
-def _is_over(above: CsvRecord, names: Sequence[str]) -> bool:
-    """Return whether a row is a first row of headings over others that need it, because two of them are the same."""
-    written = [name.lower() for name in names if name]
-    return len(set(written)) < len(written) and is_words(above, 1) and len(above.cells) > 1
-
-
-def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return headings with the group before them that stands over the first of its columns, as merged cells are exported.
-
-    A column that has a heading in the upper row alone, such as the time beside groups of runs, keeps that.
-    """
-    groups, group = [], ""
-    for i, _ in enumerate(names):
-        group = (above[i].strip() if i < len(above) else "") or group
-        groups.append(group)
-    own = [" ".join(above[i].split()) if i < len(above) else "" for i, _ in enumerate(names)]
-    return [
-        " ".join(f"{group} {name}".split()) if name else alone
-        for group, name, alone in zip(groups, names, own, strict=True)
-    ]
+    headings = find_headings(rows, file) or read_headings(filled, 0, file)
+    header, last = headings.header, headings.rows[-1]
+    above = [row for row in filled if row.row < header.row]
+    _check_above(above, sum(map(bool, headings.names)), header, file)
+    reasons = {row.row: ABOVE for row in above if row not in headings.rows}
+    body, left_out = select_readings([row for row in rows if row.row > last.row], header, file)
+    return TableParts(headings.rows, header, headings.names, headings.units, tuple(body), reasons | left_out)
 
 
 def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, file: str) -> None:
@@ -151,7 +97,7 @@ def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, fi
         DatasetError: There is such a row.
     """
     for i, row in enumerate(above):
-        words, numbers = count_words_and_numbers(row, _is_bare_number)
+        words, numbers = count_words_and_numbers(row, is_bare_number)
         if numbers >= max(columns, 2) and not words:
             raise DatasetError(
                 f"{file}, row {row.row}: it has numbers ({shown(row.cells[0])}, ...) above the headings in row "
@@ -226,17 +172,12 @@ def _refuse_other_headings(rows: Sequence[CsvRecord], header: CsvRecord, file: s
     last = max((i for i, row in enumerate(rows) if count_words_and_numbers(row)[1]), default=0)
     for row in rows[1:last]:
         words, numbers = count_words_and_numbers(row)
-        if words >= width > numbers == 0 and len({*row.cells}) > 1 and not is_units(row) and not _is_same(row, header):
+        if words >= width > numbers == 0 and len({*row.cells}) > 1 and not is_units(row) and not is_same(row, header):
             raise DatasetError(
                 f"{file}, row {row.row}: every column has words ({shown(' '.join(row.cells))}) above further rows of "
                 f"numbers, as headings do, but not those of row {header.row}; put what is below into a file of its own, or "
                 "delete the row if its columns are the same."
             )
-
-
-def _is_same(row: CsvRecord, header: CsvRecord) -> bool:
-    """Return whether a row has the headings again, in whatever spelling of letters and spaces."""
-    return [plain_name(cell) for cell in row.cells] == [plain_name(cell) for cell in header.cells]
 
 
 def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int:
@@ -305,55 +246,9 @@ def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) ->
 def _explain_row_inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:
     """Return why a row among the readings is none; empty where it is one."""
     words, numbers = count_words_and_numbers(row)
-    if not numbers and (_is_same(row, header) or is_units(row)):
+    if not numbers and (is_same(row, header) or is_units(row)):
         return AGAIN
     if not numbers and words == 1 and len(numeric) > 1:
         return BETWEEN
     at_number = [cell for i, cell in enumerate(row.cells) if i in numeric]
     return _INSIDE if is_summary(at_number) else ""
-
-
-_TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
-
-
-@lru_cache(1 << 14)  # it is asked of every cell again and again, and many cells hold the same
-def is_measured(text: str) -> bool:
-    """Return whether a cell holds what a table measures: a number with or without a unit, a percentage, a limit such as <10."""
-    return is_plain_number(text.strip().rstrip("%").lstrip("<≤=")) or is_reading(text)
-
-
-def _is_bare_number(text: str) -> bool:
-    """Return whether a cell holds a number without a unit or an error, as no heading does."""
-    return is_measured(text) and not is_reading(text)
-
-
-def count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
-    """Return how many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
-
-    Blanks, which separate words too, count for less by every word between them.
-    """
-    total = 0
-    for row in rows:
-        filled = [cell for cell in row.cells if cell.strip()]
-        numbers = sum(map(is_measured, filled))
-        wrong = filled if separator == " " else list(filter(_TOGETHER.search, filled))
-        total += numbers - sum(not is_measured(cell) for cell in wrong) * (1 if separator == " " else 2)
-    return total
-
-
-def count_words_and_numbers(row: CsvRecord, is_number: Callable[[str], bool] = is_measured) -> tuple[int, int]:
-    """Return how many cells hold words, and how many numbers; marks for nothing are neither."""
-    filled = [cell for cell in row.cells if cell.strip()]
-    numbers = sum(map(is_number, filled))
-    return sum(cell.strip().lower() not in BLANK for cell in filled) - numbers, numbers
-
-
-def is_words(row: CsvRecord, least: int = 2) -> bool:
-    """Return whether a row can be one of headings: nothing but words, or numbers with a unit."""
-    words, numbers = count_words_and_numbers(row, _is_bare_number)
-    return not numbers and words >= least
-
-
-def is_units(row: CsvRecord) -> bool:
-    """Return whether it holds nothing but units."""
-    return not count_words_and_numbers(row)[1] and is_units_row(row.cells)

@@ -9,12 +9,12 @@ from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
 from bowdenfit.files.headings import heading_of, repeated_heading
-from bowdenfit.files.measured_cells import split_measured
+from bowdenfit.files.layout import choose_separator
+from bowdenfit.files.measured_cells import is_measured, split_measured
 from bowdenfit.files.pivot import unpivot
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, make_account
-from bowdenfit.files.table_parts import TableParts, count_numbers, is_measured, split_table
+from bowdenfit.files.table_parts import TableParts, split_table
 from bowdenfit.files.text_file import (
-    SEPARATORS,
     CsvRecord,
     Line,
     check_encoding,
@@ -31,7 +31,7 @@ from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
 WORKBOOKS = (".xlsx", ".xlsm")
-_FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18  # judged: rows by which the separator is chosen, and bytes that hold as many
+_FIRST_BYTES = 1 << 18  # judged: bytes that hold the first rows
 _MOST_COLUMNS = 2000  # judged: tables of forces have some ten; each is compared with every spelling of a heading
 _MOST_CELLS = 150_000  # measured: each takes some 60 us; ring-downs of 50 s at 1 kHz have as many
 _LARGEST = 10e6  # bytes; some fifty times as many are needed to read them
@@ -122,7 +122,7 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
         all_lines = all_lines[:-1]
     declared, lines = declared_separator(all_lines, name)
     lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
-    separator = declared or max(SEPARATORS, key=lambda candidate: _score_separator(lines, candidate))
+    separator = declared or choose_separator(lines)
     rows = list(split_records(lines, separator, len(lines)))
     for row in rows:
         if not row.closed:
@@ -221,17 +221,6 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
         header, units, cells, remarks = long.header, long.units, long.rows, (f"{name}: {long.remark}",)
     errors = _errors_in_cells(header, cells)
     return RawTable(name, header, parts.headings[0].row, cells, units, account, errors, remarks)
-
-
-def _score_separator(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:
-    """Return how well a separator splits the first rows: most numbers, fewest words, equally many cells, most cells.
-
-    Blanks, which stand in headings too, separate columns only where nothing else does.
-    """
-    rows = [row for row in split_records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
-    widths = [len(row.cells) for row in rows] or [0]
-    alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
-    return count_numbers(rows, separator), separator != " ", alike, widths[0]
 
 
 def _header(parts: TableParts, file: str) -> tuple[str, ...]:

@@ -188,3 +188,15 @@ def test_a_bad_cell_near_the_top_of_a_recording_is_named_and_never_becomes_a_hea
     (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(DatasetError, match=f"row {row}, column 'F_in': '{value.split(';')[1]}' is not a number"):
         read_channels(tmp_path / "run.csv")
+
+
+def test_a_bad_cell_in_a_short_recording_never_makes_headings_of_the_samples_above_it(tmp_path):
+    (tmp_path / "run.csv").write_text("\n".join([*TABLE[:2], "4o.25;30.5", *TABLE[3:]]) + "\n", encoding="utf-8")
+    with pytest.raises(DatasetError, match=r"row 3, column 'F_in': '4o\.25' is not a number"):
+        read_channels(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("above", [["Channel;AI0;AI1", "Range;500;500", "Gain;1;1"], ROWS[:1]])
+def test_numbers_over_headings_in_words_that_do_not_repeat_themselves_are_no_part_of_them(tmp_path, above):
+    (tmp_path / "run.csv").write_text("\n".join([*above, *TABLE]) + "\n", encoding="utf-8")
+    assert [channel.name for channel in read_channels(tmp_path / "run.csv").channels] == ["F_in", "F_out"]

@@ -26,19 +26,19 @@ from bowdenfit.files.channels import (
 )
 from bowdenfit.files.clocks import assign_rate_times
 from bowdenfit.files.headings import Heading, heading_of
-from bowdenfit.files.layout import Layout, choose_decimal, choose_separator, find_layout, is_summary
+from bowdenfit.files.layout import Layout, find_layout
 from bowdenfit.files.pieces import never_falls
-from bowdenfit.files.row_account import ABOVE, BLANK, COMMENT, RowAccount, make_account
+from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, make_account
 from bowdenfit.files.sheet_columns import (
-    DATA,
-    EMPTY,
-    SPACE,
+    RowKind,
     SheetColumns,
     SheetRows,
     make_channels,
     read_cells,
     read_columns,
 )
+from bowdenfit.files.sheet_rows import is_summary, refuse_other_separator
+from bowdenfit.files.sheet_text import choose_decimal, explain_lines, split_rows
 from bowdenfit.files.text_file import (
     CsvRecord,
     Line,
@@ -46,17 +46,13 @@ from bowdenfit.files.text_file import (
     check_encoding,
     comment_mark,
     count_rows_before,
-    declared_separator,
     first_bytes,
     first_lines,
-    holds_other_row,
     is_blank,
     last_lines,
     lines_between,
-    other_separator_error,
     refuse_long_row,
     split_cells,
-    split_records,
 )
 from bowdenfit.units import is_unit
 
@@ -70,6 +66,7 @@ _MANY_ROWS = 1 << 22  # from which memory counts: see `read`
 _MARKS = sorted({form for mark in MISSING for form in (mark, mark.upper(), mark.capitalize(), mark.title())})
 _LABVIEW_UNITS = "Y_Unit_Label"  # whose cells stand over the columns of the data
 _CUT = "the file breaks off there"
+_COMMENTS = "#%"
 _FIRST_LINES = 300  # judged: in which headings and the first data must stand
 _HEADING_LINES = 12  # judged: lines over which a quoted heading may run
 
@@ -81,7 +78,6 @@ class Sheet:
     Args:
         encoding: Name of the encoding.
         separator: Separator of columns; a blank for any run of blanks and tabs.
-        decimal: Decimal mark.
         start: Where the data start [bytes].
         layout: Headings and kinds of the columns.
         metadata: The lines above the data.
@@ -90,7 +86,6 @@ class Sheet:
 
     encoding: str
     separator: str
-    decimal: str
     start: int
     layout: Layout
     metadata: tuple[str, ...]
@@ -142,12 +137,12 @@ def read(path: Path) -> ChannelFile:
 def _read_short(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
     """Return what `_read_long` would of few rows, reading cell by cell, which is quicker than loading pandas."""
     cells = read_cells(_rows(path, sheet, sheet.start, stop, None))
-    letters = np.array(cells.letters)
-    if cells.words or not np.all(np.isin(letters, [DATA, EMPTY, SPACE])):
+    row_kinds = np.array(cells.row_kinds)
+    if not np.all(np.isin(row_kinds, [RowKind.DATA, RowKind.SEPARATORS, RowKind.SPACE])):
         return None
     columns = {i: np.array(values, dtype=float) for i, values in cells.numbers.items()}
     columns |= {i: np.array(texts, dtype=object) for i, texts in cells.dates.items()}
-    return {i: [values[letters != SPACE]] for i, values in columns.items()}
+    return {i: [values[row_kinds != RowKind.SPACE]] for i, values in columns.items()}
 
 
 def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
@@ -166,7 +161,7 @@ def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray
             chunks = pandas.read_csv(
                 stream,
                 sep=sheet.separator if sheet.separator != " " else r"\s+",
-                decimal=sheet.decimal,
+                decimal=sheet.layout.decimal,
                 header=None,
                 names=list(range(len(kinds))),
                 dtype={i: str if kind in ("date", "text") else float for i, kind in enumerate(kinds)},
@@ -216,7 +211,7 @@ def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, lis
     def number(position: int) -> int:
         return count_rows_before(path, start) + position + 1
 
-    return SheetRows(path.name, sheet.layout, cells(), number, sheet.decimal, True, before)
+    return SheetRows(path.name, sheet.layout, cells(), number, True, before)
 
 
 def _is_cut(lines: Sequence[Line], separator: str) -> bool:
@@ -239,13 +234,8 @@ def read_start(path: Path, data: bytes) -> Sheet:
     encoding, lines = first_lines(data, path.name, whole=False, most=_FIRST_LINES)
     if len(lines) > 1 and not lines[-1].ended:
         lines = lines[:-1]
-    every = lines
-    declared, lines = declared_separator(lines, path.name)
-    texts = [line for line in lines if not comment_mark(line.text)]
-    separator = declared or choose_separator(texts)
-    rows = list(split_records(texts, separator, _HEADING_LINES))
-    decimal = choose_decimal(rows)
-    layout = find_layout(rows, decimal, path.name)
+    separator, rows = split_rows(lines, path.name, _COMMENTS, _HEADING_LINES)
+    layout = find_layout(rows, choose_decimal(rows), path.name)
     if layout is None:
         raise DatasetError(
             f"{path.name} has no rows of numbers in columns; export the recording as CSV with one column for each signal."
@@ -254,21 +244,13 @@ def read_start(path: Path, data: bytes) -> Sheet:
     above = [line for line in lines if line.start < first.start]
     below = [row for row in rows if row.start >= first.start]
     layout = _take_units_of_labview(_fit_layout(path, layout, below, separator, above), separator, above)
-    others = {
-        line.row: _explain_row_above(line) for line in every if line.start < first.start and line.row not in layout.over
-    }
+    texts = {line.row: (ABOVE, " ".join(line.text.split())) for line in above if line.row not in layout.over}
+    others = explain_lines([line for line in above if line.row in texts], rows, texts, _COMMENTS)
     width = len(layout.kinds)
-    for line in every:
-        is_short = others.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width
-        if is_short and holds_other_row(line.text, width):
-            raise other_separator_error(path.name, line.row, line.text.strip())
-    return Sheet(encoding, separator, decimal, first.start, layout, tuple(line.text for line in above), others)
-
-
-def _explain_row_above(line: Line) -> tuple[str, str]:
-    if is_blank(line.text):
-        return BLANK, ""
-    return (COMMENT, "") if comment_mark(line.text) else (ABOVE, " ".join(line.text.split()))
+    for line in above:
+        if others.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width:
+            refuse_other_separator(path.name, line.row, line.text.strip(), width, layout.numeric)
+    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), others)
 
 
 def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:

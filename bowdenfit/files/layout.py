@@ -1,118 +1,39 @@
 """Where the headings and the data of a sheet are, for tables and recordings alike.
 
-`choose_separator` divides lines into cells; `find_headings` finds the row of headings, by the numbers below it, with the groups
+`find_headings` finds the row of headings, by the numbers below it, with the groups
 over it and the units under it; `find_layout` says for a recording what its columns hold and where they begin.
 """
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from bowdenfit.files.cells import MISSING, Kind, classify_cell, parse_number
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.cells import Kind, classify_cell, parse_number
 from bowdenfit.files.clocks import names_time
-from bowdenfit.files.headings import (
-    Heading,
-    heading_of,
-    is_number,
-    is_units_row,
-    plain_name,
-    refuse_two_units,
-    strip_brackets,
+from bowdenfit.files.headings import Heading, heading_of, is_number, refuse_two_units, strip_brackets
+from bowdenfit.files.measured_cells import is_reading
+from bowdenfit.files.sheet_rows import (
+    count_words_and_numbers,
+    drop_label,
+    is_bare_number,
+    is_same,
+    is_summary,
+    is_units,
+    is_words,
 )
-from bowdenfit.files.measured_cells import is_measured, is_reading
-from bowdenfit.files.text_file import SEPARATORS, CsvRecord, Line, split_records
+from bowdenfit.files.text_file import CsvRecord
 from bowdenfit.types import Vector
+from bowdenfit.words import shown
 
-_SUMMARY = re.compile(
-    r"(?:(?:min|max|avg|average|mean|std|stdev|stddev|sd|sem|median|rms|sum|total|count|range|half range|peak|variance|"
-    r"minimum|maximum|mittelwert|summe|anzahl|moyenne|media|standard deviation|standardabweichung)[\s:.=]*)",
-    re.IGNORECASE,
-)
-_TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
 _KINDS: tuple[Kind, ...] = ("number", "date", "text")
 _NEAR_TOP = 60  # judged: rows in which headings are looked for
-_FIRST_ROWS = 300  # judged: rows by which the separator is chosen
+_MOST_NUMBERS_OVER = 2  # judged: rows of numbers over the headings of a recording, such as angle and trial
 _STEPS = 60  # judged: rows that are enough to see a clock rise in even steps
 _UNEVEN = 3.0  # judged: largest step of a clock over its smallest
 _FEWEST_ROWS = 4  # judged: rows from which one of numbers may be the headings of the others
-
-
-def count_words_and_numbers(row: CsvRecord, test: Callable[[str], bool] = is_measured) -> tuple[int, int]:
-    """Return how many cells hold words, and how many numbers; marks for nothing are neither."""
-    filled = [cell for cell in row.cells if cell.strip()]
-    numbers = sum(map(test, filled))
-    return sum(cell.strip().lower() not in MISSING for cell in filled) - numbers, numbers
-
-
-def is_words(row: CsvRecord, least: int = 2) -> bool:
-    """Return whether a row can be one of headings: nothing but words, or numbers with a unit."""
-    words, numbers = count_words_and_numbers(row, is_bare_number)
-    return not numbers and words >= least
-
-
-def is_bare_number(text: str) -> bool:
-    """Return whether a cell holds a number without a unit or an error, as no heading does."""
-    return is_measured(text) and not is_reading(text)
-
-
-def is_units(row: CsvRecord) -> bool:
-    """Return whether a row holds nothing but units."""
-    return not count_words_and_numbers(row)[1] and is_units_row(row.cells)
-
-
-def is_same(row: CsvRecord, header: CsvRecord) -> bool:
-    """Return whether a row has the headings again, in whatever spelling of letters and spaces."""
-    return [plain_name(cell) for cell in row.cells] == [plain_name(cell) for cell in header.cells]
-
-
-def is_summary(cells: Sequence[str]) -> bool:
-    """Return whether a row below the data is one of minima, averages and the like."""
-    return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
-
-
-def choose_separator(lines: Sequence[Line]) -> str:
-    """Return what separates the columns of some lines: the separator by which headings fit and most cells are numbers."""
-    first = lines[:_FIRST_ROWS]
-    text = "".join(line.text for line in first)
-    return max((s for s in SEPARATORS if s in (SEPARATORS[0], " ") or s in text), key=lambda s: _score_separator(first, s))
-
-
-def _score_separator(lines: Sequence[Line], separator: str) -> tuple[bool, int, bool, bool, int]:
-    """Return how well a separator splits rows: headings over all numbers, most numbers, equally many cells, most cells.
-
-    Blanks, which stand in headings too, separate columns only where nothing else does.
-    """
-    rows = [row for row in split_records(lines, separator, len(lines)) if not row.blank]
-    numbers = _count_numbers(rows, separator)
-    position = _header_position(rows) if numbers > 0 else None
-    room = len(rows[position].cells) if position is not None else 0
-    fits = position is not None and not any(is_measured(cell) for row in rows[position:] for cell in row.cells[room:])
-    widths = [len(row.cells) for row in rows] or [0]
-    alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
-    return fits, numbers, separator != " ", alike, widths[0]
-
-
-def _count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
-    """Return how many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
-
-    Blanks, which separate words too, count for less by every word between them.
-    """
-    total = 0
-    for row in rows:
-        filled = [cell for cell in row.cells if cell.strip()]
-        numbers = sum(map(is_measured, filled))
-        wrong = filled if separator == " " else list(filter(_TOGETHER.search, filled))
-        total += numbers - sum(not is_measured(cell) for cell in wrong) * (1 if separator == " " else 2)
-    return total
-
-
-def choose_decimal(rows: Sequence[CsvRecord]) -> str:
-    """Return the decimal mark by which most cells are numbers."""
-    cells = [cell for row in rows for cell in row.cells]
-    return max(".,", key=lambda mark: sum(parse_number(cell, mark) is not None for cell in cells))
 
 
 @dataclass(frozen=True)
@@ -145,11 +66,11 @@ def find_headings(rows: Sequence[CsvRecord], place: str, groups: bool = True) ->
         DatasetError: A unit below a heading is another than the one in it.
     """
     filled = [row for row in rows if not row.blank]
-    position = _header_position(filled)
+    position = header_position(filled)
     return None if position is None else read_headings(filled, position, place, groups)
 
 
-def _header_position(filled: Sequence[CsvRecord]) -> int | None:
+def header_position(filled: Sequence[CsvRecord]) -> int | None:
     """Return which of the rows holds the headings: that of words alone over most numbers; None where there is none."""
     widest = max((len([cell for cell in row.cells if cell.strip()]) for row in filled), default=0)
     least = 2 if widest > 1 else 1
@@ -199,12 +120,15 @@ def read_headings(filled: Sequence[CsvRecord], position: int, place: str, groups
 
 
 def _is_over(above: CsvRecord, names: Sequence[str], groups: bool) -> bool:
-    """Return whether a row is a first row of headings, over others that are numbers alone or of which two are the same."""
+    """Return whether a row is a first row of headings: numbers alone, or over numbers, or over headings that repeat."""
     written = [name.lower() for name in names if name]
     is_repeated, are_numbers = len(set(written)) < len(written), all(map(is_number, written))
-    if all(is_number(cell) for cell in drop_label(above.cells) if cell.strip()):
-        return len(above.cells) > 1 and (is_repeated or are_numbers)
-    return len(above.cells) > 1 and is_repeated and groups and is_words(above, 1)
+    if len(above.cells) < 2:
+        return False
+    if all(is_number(cell) for cell in above.cells if cell.strip()):
+        return True
+    are_labeled = all(is_number(cell) for cell in drop_label(above.cells) if cell.strip())
+    return (are_labeled and (is_repeated or are_numbers)) or (is_repeated and groups and is_words(above, 1))
 
 
 def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:
@@ -220,25 +144,64 @@ def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:
     return joined
 
 
+def refuse_readings_above(filled: Sequence[CsvRecord], headings: Headings, place: str, most: int = 0) -> None:
+    """Refuse readings above the headings, rather than leave them out.
+
+    Args:
+        filled: The rows that are not blank.
+        headings: The headings.
+        place: File, and sheet where it has several.
+        most: Rows of numbers that may be a part of the headings.
+
+    Raises:
+        DatasetError: There are more rows of numbers than that, as wide as the headings, or some behind other headings.
+    """
+    header, columns = headings.header, sum(map(bool, headings.names))
+    above = [row for row in filled if row.row < header.row]
+    counts = [count_words_and_numbers(row, is_bare_number) for row in above]
+    samples = [row for row, (words, numbers) in zip(above, counts, strict=True) if numbers >= max(columns, 2) and not words]
+    if len(samples) > most:
+        raise DatasetError(
+            f"{place}, row {samples[0].row}: it has numbers ({shown(samples[0].cells[0])}, ...) above the headings in row "
+            f"{header.row}; put the headings over all rows of the table, or delete the rows above them."
+        )
+    for i, (row, (words, numbers)) in enumerate(zip(above, counts, strict=True)):
+        if words + numbers == columns and numbers > max(most, 1) and any(is_words(other, columns) for other in above[:i]):
+            raise DatasetError(
+                f"{place}, row {row.row}: a row of a table ({shown(' '.join(row.cells))}) is above the headings in row "
+                f"{header.row}; put what is above these into a file of its own, or delete it, and row {header.row} too if its "
+                "columns are the same."
+            )
+
+
 @dataclass(frozen=True)
 class Layout:
     """What the columns of a recording hold and where they begin.
 
     Args:
+        decimal: Decimal mark of its numbers.
         first: The first row of data.
         headings: One for each column; `named` says whether the file gave them.
         kinds: Kind of the cells of each column.
         named: Whether there is a row of headings.
+        header: That row; None without.
         heading_cells: Number of cells in the row of headings.
         over: Numbers of the rows of headings and units.
     """
 
+    decimal: str
     first: CsvRecord
     headings: tuple[Heading, ...]
     kinds: tuple[Kind, ...]
     named: bool = False
+    header: CsvRecord | None = None
     heading_cells: int = 0
     over: tuple[int, ...] = ()
+
+    @property
+    def numeric(self) -> list[int]:
+        """Positions of the columns of numbers and dates."""
+        return [i for i, kind in enumerate(self.kinds) if kind in ("number", "date")]
 
     @property
     def room(self) -> int:
@@ -275,7 +238,9 @@ def find_layout(rows: Sequence[CsvRecord], decimal: str, place: str) -> Layout |
     data = [row for row in rows if row.row > above and _is_data(row, decimal)]
     if not data:
         return None
-    if headings:  # a row of words among the data counts too
+    if headings:
+        refuse_readings_above([row for row in rows if not row.blank], headings, place, _MOST_NUMBERS_OVER)
+        # A row of words among the data counts too.
         data = [row for row in rows if above < row.row <= data[-1].row and not row.blank and not is_summary(row.cells)]
     kinds = _kinds_of_columns(data, decimal)
     width = sorted(map(_filled_width, data))[len(data) // 2]
@@ -294,7 +259,7 @@ def _find_layout_by_numbers(
     above = [replace(row, cells=drop_label(row.cells)) for row in rows if row.row < first.row and not row.blank]
     if not (above and _can_head(above[-1], len(kinds))):
         if not _is_numeric_heading(data, decimal):
-            return Layout(first, tuple(Heading(f"column{i + 1}") for i in range(len(kinds))), tuple(kinds))
+            return Layout(decimal, first, tuple(Heading(f"column{i + 1}") for i in range(len(kinds))), tuple(kinds))
         above, data, first = [*above, first], data[1:], data[1]
     headings = read_headings(above, len(above) - 1, place)
     return _name_columns(first, headings, data, kinds, decimal)
@@ -313,7 +278,8 @@ def _name_columns(
     rising = [_rises(data, i, decimal) for i in range(len(kinds))]
     paired = pair_clocks(named, rising, [kind == "number" for kind in kinds])
     cells = max(len(row.cells) for row in headings.rows)
-    return Layout(first, paired, tuple(kinds), True, cells, tuple(row.row for row in headings.rows))
+    over = tuple(row.row for row in headings.rows)
+    return Layout(decimal, first, paired, tuple(kinds), True, headings.header, cells, over)
 
 
 def is_index(values: Vector) -> bool:
@@ -367,15 +333,6 @@ def _rises(data: Sequence[CsvRecord], column: int, decimal: str) -> bool:
     values = [value for value in cells if value is not None and value == value]
     steps = [after - before for before, after in pairwise(values)]
     return len(steps) > 1 and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
-
-
-def drop_label(cells: Sequence[str]) -> list[str]:
-    """Return a row of numbers over columns ("Angle", 45, 45, 90) without the word before it that says what they are."""
-    filled = [i for i, cell in enumerate(cells) if cell.strip()]
-    labeled = len(filled) > 1 and not is_number(cells[filled[0]]) and all(is_number(cells[i]) for i in filled[1:])
-    if labeled and not names_time(cells[filled[0]]):
-        return ["" if i == filled[0] else cell for i, cell in enumerate(cells)]
-    return list(cells)
 
 
 def pair_clocks(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequence[bool]) -> tuple[Heading, ...]:

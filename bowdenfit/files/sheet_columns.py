@@ -1,37 +1,49 @@
 """From the rows of a sheet, whatever program wrote it, to channels.
 
-`read_cells` reads cell by cell and notes a letter for what each row holds; `read_columns` decides by these letters where
-the data end and what is a remark; `make_channels` names the columns and gives them their clocks.
+`read_cells` reads cell by cell and notes the kind of each row; `read_columns` decides by these kinds where the data end and
+what is a remark; `make_channels` names the columns and gives them their clocks.
 """
 
 import math
-import re
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
+from enum import IntEnum
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, classify_cell, parse_number
 from bowdenfit.files.channels import Channel, make_names_unique
 from bowdenfit.files.clocks import assign_clocks, parse_dates, trim_tails
-from bowdenfit.files.headings import heading_of
-from bowdenfit.files.layout import Layout, is_index, is_summary
+from bowdenfit.files.layout import Layout, is_index
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
-from bowdenfit.files.text_file import holds_other_row, other_separator_error, refuse_long_row
+from bowdenfit.files.sheet_rows import explain_row, is_summary, refuse_other_headings, refuse_other_separator
+from bowdenfit.files.text_file import CsvRecord, refuse_long_row
 from bowdenfit.types import Vector
 from bowdenfit.words import few, shown
 
 _MOST_SUMMARY_ROWS = 40  # judged: rows of statistics below the data
 _MOST_ROWS_AFTER_BLANK = 10  # judged: rows behind a blank one that are an evaluation rather than data
-_BLOCK_OF_WORDS = re.compile(rb"(?<=[^ ])(?: +[wm#]+)+$")
-_LAST_FEW = re.compile(rb"([^ ]+) +([^ ]{1,%d})" % _MOST_ROWS_AFTER_BLANK)
 
-DATA, SPACE, EMPTY, REMARKED, SUMMARY, WORDS, MIXED, REMARK = b"d ,#swmr"
-"""What a row holds: readings, nothing, separators only, a comment, statistics, words, words among numbers, a remark."""
+
+class RowKind(IntEnum):
+    """What a row holds."""
+
+    DATA = 0  # readings
+    SPACE = 1  # nothing
+    SEPARATORS = 2  # separators only
+    COMMENT = 3
+    STATISTICS = 4
+    WORDS = 5  # no numbers
+    MIXED = 6  # words where numbers are expected, beside numbers
+    REMARK = 7  # words between the rows that are no readings
+
+
+_BLANK_KINDS = (RowKind.SPACE, RowKind.SEPARATORS, RowKind.COMMENT)
+_OF_TEXT = (RowKind.WORDS, RowKind.MIXED, RowKind.COMMENT)
 
 
 @dataclass(frozen=True)
@@ -43,7 +55,6 @@ class SheetRows:
         layout: Headings and kinds of the columns.
         rows: Their cells, text or as the library gives them; None for a comment.
         number: The number in the file of the row at a position, from 0.
-        decimal: Decimal mark of numbers that are text.
         of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
         before: Numbers or dates of each column that have been read from the rows before, in pieces; taken out.
     """
@@ -52,7 +63,6 @@ class SheetRows:
     layout: Layout
     rows: Iterable[Sequence[Any] | None]
     number: Callable[[int], int]
-    decimal: str = "."
     of_text: bool = False
     before: dict[int, list[np.ndarray]] | None = None
 
@@ -64,14 +74,14 @@ class SheetCells:
     Args:
         numbers: The numbers of each column.
         dates: The texts of each column of dates.
-        words: Position, column and text of each cell that is not as it should be; the cells of a row that has too many.
-        letters: Kinds of cells in each row, as letters.
+        row_kinds: Kind of each row (`RowKind`).
+        texts: By position, the cells of the rows that have words where numbers or dates are expected, or too many cells.
     """
 
     numbers: dict[int, array]
     dates: dict[int, list[str]]
-    words: list[tuple[int, int, Any]]
-    letters: bytearray
+    row_kinds: bytearray = field(default_factory=bytearray)
+    texts: dict[int, list[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -128,23 +138,12 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
-    kinds, cells = sheet.layout.kinds, read_cells(sheet)
-    stop = _data_end(bytes(cells.letters))
-    left_out, beside = _explain_left_out(sheet, cells, stop), []
-    for position, column, text in cells.words:
-        if position >= stop:
-            break
-        row = sheet.number(position)
-        if row in left_out:
-            continue
-        if column == len(kinds):
-            beside.append((row, _remark_beside(sheet, row, text)))
-        elif kinds[column] == "number" or (sheet.of_text and kinds[column] == "blank"):
-            _refuse_other_headings(sheet, row, [cell_text(other) for at, _, other in cells.words if at == position])
-            raise Cell(sheet.place, row, sheet.layout.name(column), text).no_sample(sheet.decimal)
-    dropped = [REMARKED, SPACE, REMARK] if sheet.of_text else [REMARKED, REMARK]
-    retained = ~np.isin(np.array(cells.letters[:stop]), dropped)
-    columns: list[Vector | None] = [None] * len(kinds)
+    cells = read_cells(sheet)
+    stop = _find_data_end(cells.row_kinds)
+    left_out, beside = _explain_rows(sheet, cells, stop)
+    dropped = {RowKind.COMMENT, RowKind.REMARK} | ({RowKind.SPACE} if sheet.of_text else set())
+    retained = ~np.isin(np.array(cells.row_kinds[:stop]), list(dropped))
+    columns: list[Vector | None] = [None] * len(sheet.layout.kinds)
     starts = dict[int, float]()
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
@@ -159,102 +158,101 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
-    remarks = _describe_left_out(sheet, cells.letters, left_out, beside, stop)
-    return SheetColumns(columns, remarks, left_out, beside, len(cells.letters), starts)
+    remarks = _describe_left_out(sheet, cells.row_kinds, left_out, beside, stop)
+    return SheetColumns(columns, remarks, left_out, beside, len(cells.row_kinds), starts)
 
 
-def _refuse_other_headings(sheet: SheetRows, row: int, words: Sequence[str]) -> None:
-    """Refuse a row that has a word in every column, each another one, as headings do that are not those of the sheet.
+def _explain_rows(
+    sheet: SheetRows, cells: SheetCells, stop: int
+) -> tuple[dict[int, tuple[str, str]], list[tuple[int, str]]]:
+    """Return why rows are not read and what they say, by their numbers, and remarks beside those that are read.
+
+    Remarks between the rows become `RowKind.REMARK`.
 
     Raises:
-        DatasetError: It is such a row.
+        DatasetError: A row is neither readings nor a remark.
     """
-    columns = sum(kind != "blank" for kind in sheet.layout.kinds)
-    if len(words) >= columns > 1 and len({*words}) == len(words):
-        raise DatasetError(
-            f"{sheet.place}, row {row}: every column has words ({shown(' '.join(words))}), as headings do, but not those "
-            "at the top; the usual cause is a second recording behind the first. Put what is below into a file of its own, or "
-            "delete the row if its columns are the same."
-        )
-
-
-def _explain_left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple[str, str]]:
-    """Return why rows are not read, by their numbers; remarks between the rows are marked as such in the letters."""
-    of_row: dict[int, list[tuple[int, str]]] = {}
-    for position, column, text in cells.words:
-        if column < len(sheet.layout.kinds):
-            of_row.setdefault(position, []).append((column, cell_text(text)))
     left_out: dict[int, tuple[str, str]] = {}
-    for position, letter in enumerate(cells.letters):
-        text_of_row = " ".join(text for _, text in of_row.get(position, ()))
-        if letter == REMARKED:
-            left_out[sheet.number(position)] = COMMENT, ""
-        elif letter == SPACE or (letter == EMPTY and position >= stop):
-            left_out[sheet.number(position)] = BLANK, ""
-        elif position >= stop:
-            _refuse_samples(sheet, position, of_row.get(position, []))
-            left_out[sheet.number(position)] = BELOW, text_of_row
-        elif letter == WORDS and (reason := _explain_words(sheet, of_row.get(position, []))):
-            _refuse_samples(sheet, position, of_row[position])
-            left_out[sheet.number(position)] = reason, text_of_row
-            cells.letters[position] = REMARK
-    return left_out
+    beside: list[tuple[int, str]] = []
+    layout = sheet.layout
+    width = sum(kind != "blank" for kind in layout.kinds)
+    for position, kind in enumerate(cells.row_kinds):
+        if position < stop and kind in (RowKind.DATA, RowKind.SEPARATORS):
+            continue
+        row = CsvRecord(sheet.number(position), 0, cells.texts.get(position, []))
+        text = " ".join(filter(None, map(str.strip, row.cells)))
+        reason = explain_row(row, layout.header, layout.numeric) if kind == RowKind.WORDS else ""
+        if kind in _BLANK_KINDS:
+            left_out[row.row] = (COMMENT if kind == RowKind.COMMENT else BLANK), ""
+        elif position >= stop or reason:
+            refuse_other_separator(sheet.place, row.row, text, len(layout.kinds), layout.numeric)
+            left_out[row.row] = (BELOW if position >= stop else reason), text
+            cells.row_kinds[position] = RowKind.REMARK
+        else:
+            refuse_other_headings(sheet.place, row, layout.header, width)
+            beside += _read_row_with_words(sheet, row)
+    return left_out, beside
 
 
-def _refuse_samples(sheet: SheetRows, position: int, words: Sequence[tuple[int, str]]) -> None:
-    """Refuse to leave out a row whose only words are numbers behind another separator.
-
-    Raises:
-        DatasetError: It is such a row.
-    """
-    if len(words) == 1 and holds_other_row(words[0][1], len(sheet.layout.kinds)):
-        raise other_separator_error(sheet.place, sheet.number(position), words[0][1])
-
-
-def _explain_words(sheet: SheetRows, words: Sequence[tuple[int, str]]) -> str:
-    """Return why a row without numbers is no bad sample, one remark alone or the headings again; empty where it is one."""
-    if len(words) == 1 and len(sheet.layout.kinds) > 1:
-        return BETWEEN
-    again = all(heading_of(text).name == sheet.layout.headings[column].name for column, text in words)
-    return AGAIN if words and again else ""
-
-
-def _remark_beside(sheet: SheetRows, row: int, cells: Sequence[str]) -> str:
-    """Return the words behind the last column.
+def _read_row_with_words(sheet: SheetRows, row: CsvRecord) -> list[tuple[int, str]]:
+    """Return the remark behind the last column of a row of readings, with its number; empty without.
 
     Raises:
-        DatasetError: Numbers stand there.
+        DatasetError: Words stand in a column of numbers, or numbers behind the last column.
     """
-    width = len(sheet.layout.kinds)
-    behind = [cell.strip() for cell in cells[width:] if cell.strip()]
-    if any(classify_cell(cell, sheet.decimal) != "text" for cell in behind):
-        refuse_long_row(sheet.place, row, cells, width)
-    return " ".join(behind)
+    layout = sheet.layout
+    of_numbers = ("number", "blank") if sheet.of_text else ("number",)
+    for i, (text, kind) in enumerate(zip(row.cells, layout.kinds, strict=False)):
+        if kind in of_numbers and parse_number(text, layout.decimal) is None:
+            raise Cell(sheet.place, row.row, layout.name(i), text).no_sample(layout.decimal)
+    behind = [cell.strip() for cell in row.cells[len(layout.kinds) :] if cell.strip()] if sheet.of_text else []
+    if any(classify_cell(cell, layout.decimal) != "text" for cell in behind):
+        refuse_long_row(sheet.place, row.row, row.cells, len(layout.kinds))
+    return [(row.row, " ".join(behind))] if behind else []
 
 
-def _data_end(letters: bytes) -> int:
-    """Return the position of the row behind the data, by a letter for each row.
+def _find_data_end(row_kinds: bytearray) -> int:
+    """Return the position of the row behind the data.
 
     Below the data stand statistics, words alone, a block in whose every row are words, or a few last rows after a blank.
     """
-    filled = letters.rstrip(b" ,#")
-    label = filled.find(SUMMARY, max(0, len(filled) - _MOST_SUMMARY_ROWS))
-    data = (filled if label < 0 else filled[:label]).rstrip(b" ,#w")
-    data = _BLOCK_OF_WORDS.sub(b"", data)
-    last = _LAST_FEW.fullmatch(data)
-    return last.end(1) if last and last.end(1) > 2 * len(last[2]) + 2 else len(data)
+    end = _strip_end(row_kinds, len(row_kinds), _BLANK_KINDS)
+    label = row_kinds.find(RowKind.STATISTICS, max(0, end - _MOST_SUMMARY_ROWS), end)
+    end = _strip_end(row_kinds, end if label < 0 else label, (*_BLANK_KINDS, RowKind.WORDS))
+    blocks = list(_split_at_blank_rows(row_kinds[:end]))
+    while len(blocks) > 1 and all(kind in _OF_TEXT for kind in row_kinds[slice(*blocks[-1])]):
+        blocks.pop()
+    sizes = [stop - start for start, stop in blocks]
+    if len(blocks) == 2 and sizes[1] <= _MOST_ROWS_AFTER_BLANK and sizes[0] > 2 * sizes[1] + 2:
+        blocks.pop()
+    return blocks[-1][1] if blocks else 0
+
+
+def _strip_end(row_kinds: bytearray, end: int, kinds: Sequence[RowKind]) -> int:
+    """Return the position behind the last row before `end` that is of no such kind."""
+    return len(row_kinds[:end].rstrip(bytes(kinds)))
+
+
+def _split_at_blank_rows(row_kinds: bytearray) -> Iterator[tuple[int, int]]:
+    """Yield start and stop of each block of rows between blank ones."""
+    start = 0
+    for blank, rows in groupby(row_kinds, key=lambda kind: kind == RowKind.SPACE):
+        stop = start + sum(1 for _ in rows)
+        if not blank:
+            yield start, stop
+        start = stop
 
 
 def _describe_left_out(
     sheet: SheetRows,
-    letters: bytearray,
+    row_kinds: bytearray,
     left_out: Mapping[int, tuple[str, str]],
     beside: Sequence[tuple[int, str]],
     stop: int,
 ) -> list[str]:
-    comments = letters[:stop].count(REMARKED)
+    comments = row_kinds[:stop].count(RowKind.COMMENT)
     sentences = [f"{comments} comment lines between the rows of data were left out."] if comments else []
-    below = [i for i in range(stop, len(letters)) if letters[i] not in b" ,#"]
+    below = [i for i in range(stop, len(row_kinds)) if row_kinds[i] not in _BLANK_KINDS]
     if below:
         top, bottom = sheet.number(below[0]), sheet.number(below[-1])
         place = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
@@ -269,45 +267,45 @@ def _describe_left_out(
 
 def read_cells(sheet: SheetRows) -> SheetCells:
     """Return all cells of a sheet."""
-    kinds = sheet.layout.kinds
+    kinds, decimal = sheet.layout.kinds, sheet.layout.decimal
     numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
-    cells = SheetCells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
+    cells = SheetCells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"})
     for position, row in enumerate(sheet.rows):
         filled = row or ()
-        if sheet.of_text and len(filled) > len(kinds) and any(map(str.strip, filled[len(kinds) :])):
-            cells.words.append((position, len(kinds), filled))
-        known = len(cells.words)
+        as_expected = not sheet.of_text or not any(map(str.strip, filled[len(kinds) :]))
         for i, column in cells.numbers.items():
             cell = filled[i] if i < len(filled) else None
-            column.append(cell if type(cell) in (float, int) else _read_number(cells, position, i, cell, sheet.decimal))
+            value = cell if type(cell) in (float, int) else parse_number(cell_text(cell), decimal)
+            column.append(math.nan if value is None else value)
+            as_expected = as_expected and value is not None
         for i, texts in cells.dates.items():
             texts.append(cell_text(filled[i]) if i < len(filled) else "")
-            if classify_cell(texts[-1], sheet.decimal) == "text":
-                cells.words.append((position, i, texts[-1]))
-        cells.letters.append(_row_letter(row, sheet, len(cells.words) > known))
+            as_expected = as_expected and classify_cell(texts[-1], decimal) != "text"
+        if not as_expected:
+            cells.texts[position] = [cell_text(cell) for cell in filled]
+        cells.row_kinds.append(_kind_of_row(row, sheet, cells.texts.get(position)))
     return cells
 
 
-def _read_number(cells: SheetCells, row: int, column: int, cell: object, decimal: str) -> float:
-    value = parse_number(cell_text(cell), decimal)
-    if value is None:
-        cells.words.append((row, column, cell_text(cell)))
-    return math.nan if value is None else value
+def _kind_of_row(row: Sequence[Any] | None, sheet: SheetRows, texts: Sequence[str] | None) -> RowKind:
+    """Return what a row holds; statistics bear a label in a column that holds no words in the data.
 
-
-def _row_letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
-    """Return what a row holds; statistics bear a label in a column that holds no words in the data."""
+    Args:
+        row: Its cells; None for a comment.
+        sheet: The sheet.
+        texts: Its cells as text, where not all are as expected; else None.
+    """
     if row is None:
-        return REMARKED
+        return RowKind.COMMENT
     if all(cell is None or cell == "" for cell in row):
-        return EMPTY if sheet.of_text and row else SPACE
-    if not worded:
-        return DATA
-    texts, kinds = [cell_text(cell) for cell in row], sheet.layout.kinds
+        return RowKind.SEPARATORS if sheet.of_text and row else RowKind.SPACE
+    if texts is None:
+        return RowKind.DATA
+    kinds = sheet.layout.kinds
     if is_summary([text for i, text in enumerate(texts) if i >= len(kinds) or kinds[i] != "text"]):
-        return SUMMARY
-    kinds_of_cells = {classify_cell(text, sheet.decimal) for text in texts}
-    return MIXED if len(kinds) == 1 or kinds_of_cells & {"number", "date"} else WORDS
+        return RowKind.STATISTICS
+    kinds_of_cells = {classify_cell(text, sheet.layout.decimal) for text in texts}
+    return RowKind.MIXED if len(kinds) == 1 or kinds_of_cells & {"number", "date"} else RowKind.WORDS
 
 
 def cell_text(cell: object) -> str:

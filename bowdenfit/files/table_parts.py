@@ -9,19 +9,18 @@ from dataclasses import dataclass, field, replace
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK
-from bowdenfit.files.layout import (
-    count_words_and_numbers,
-    find_headings,
-    is_bare_number,
-    is_same,
-    is_summary,
-    is_units,
-    is_words,
-    read_headings,
-)
+from bowdenfit.files.layout import Headings, find_headings, read_headings, refuse_readings_above
 from bowdenfit.files.measured_cells import is_measured
-from bowdenfit.files.row_account import ABOVE, AGAIN, BELOW, BETWEEN
-from bowdenfit.files.text_file import SEPARATORS, CsvRecord, other_separator_error, split_cells
+from bowdenfit.files.row_account import ABOVE, BELOW
+from bowdenfit.files.sheet_rows import (
+    count_words_and_numbers,
+    explain_row,
+    is_summary,
+    is_words,
+    refuse_other_headings,
+    refuse_other_separator,
+)
+from bowdenfit.files.text_file import CsvRecord
 from bowdenfit.words import shown
 
 
@@ -30,19 +29,13 @@ class TableParts:
     """What the rows of a file are.
 
     Args:
-        headings: The rows that hold headings and their units, from above.
-        header: Of these the one that names the columns.
-        names: Heading of each column.
-        units: The unit below each name; empty without one.
+        headings: Its headings.
         body: The rows of readings.
         left_out: Why each of the other rows is not read, by its number, but for blank ones.
         beside: Row and text of remarks behind an empty column.
     """
 
-    headings: tuple[CsvRecord, ...]
-    header: CsvRecord
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    headings: Headings
     body: tuple[CsvRecord, ...]
     left_out: dict[int, str] = field(default_factory=dict)
     beside: tuple[tuple[int, str], ...] = ()
@@ -59,9 +52,9 @@ def split_table(rows: Sequence[CsvRecord], file: str) -> TableParts:
     if gap is None:
         return parts
     whole = {row.row: row.cells for row in rows}
-    if any(map(str.strip, whole[parts.header.row][gap : gap + 1])):
+    if any(map(str.strip, whole[parts.headings.header.row][gap : gap + 1])):
         return _split_columns(rows, file)  # a column that nothing was written into
-    used = [row.row for row in (*parts.headings, *parts.body)]
+    used = [row.row for row in (*parts.headings.rows, *parts.body)]
     beside = [(row, " ".join(filter(None, map(str.strip, whole[row][gap:])))) for row in used]
     return replace(parts, beside=tuple((row, text) for row, text in beside if text))
 
@@ -82,38 +75,15 @@ def _find_gap(rows: Sequence[CsvRecord]) -> int | None:
 def _split_columns(rows: Sequence[CsvRecord], file: str) -> TableParts:
     filled = [row for row in rows if not row.blank]
     headings = find_headings(rows, file) or read_headings(filled, 0, file)
-    header, last = headings.header, headings.rows[-1]
-    above = [row for row in filled if row.row < header.row]
-    _check_above(above, sum(map(bool, headings.names)), header, file)
-    reasons = {row.row: ABOVE for row in above if row not in headings.rows}
-    body, left_out = select_readings([row for row in rows if row.row > last.row], header, file)
-    return TableParts(headings.rows, header, headings.names, headings.units, tuple(body), reasons | left_out)
-
-
-def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, file: str) -> None:
-    """Refuse rows of numbers alone, as many as there are columns, above the headings.
-
-    Raises:
-        DatasetError: There is such a row.
-    """
-    for i, row in enumerate(above):
-        words, numbers = count_words_and_numbers(row, is_bare_number)
-        if numbers >= max(columns, 2) and not words:
-            raise DatasetError(
-                f"{file}, row {row.row}: it has numbers ({shown(row.cells[0])}, ...) above the headings in row "
-                f"{header.row}; put the headings over all rows of the table, or delete the rows above them."
-            )
-        if words + numbers == columns and numbers > 1 and any(is_words(other, columns) for other in above[:i]):
-            raise DatasetError(
-                f"{file}, row {row.row}: a row of a table ({shown(' '.join(row.cells))}) is above the headings in row "
-                f"{header.row}; put what is above these into a file of its own, or delete it, and row {header.row} too if its "
-                "columns are the same."
-            )
+    refuse_readings_above(filled, headings, file)
+    reasons = {row.row: ABOVE for row in filled if row.row < headings.header.row and row not in headings.rows}
+    body, left_out = select_readings([row for row in rows if row.row > headings.rows[-1].row], headings.header, file)
+    return TableParts(headings, tuple(body), reasons | left_out)
 
 
 _MOST_STATISTICS = 8  # judged: rows of statistics that may stand below text columns
 _FEWEST_ALIKE, _SHARE_ALIKE = 2, 0.05  # judged: rows below words, and share of those above, from which they may be data
-_STATISTICS, _INSIDE = "statistics below the table", "statistics between the rows"
+_STATISTICS = "statistics below the table"
 
 
 def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[list[CsvRecord], dict[int, str]]:
@@ -123,7 +93,10 @@ def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> 
         DatasetError: A row that would be left out looks like a reading.
     """
     stop = _find_next_table(rows, header, file)
-    _refuse_other_headings(rows[:stop], header, file)
+    width = sum(bool(cell.strip()) for cell in header.cells)
+    last = max((i for i, row in enumerate(rows[:stop]) if count_words_and_numbers(row)[1]), default=0)
+    for row in rows[1:last]:
+        refuse_other_headings(file, row, header, width)
     numeric = _numeric_columns(rows[:stop])
     agree = [_agrees(row, numeric) for row in rows[:stop]]
     if not any(agree):
@@ -136,48 +109,15 @@ def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> 
     for i, row in enumerate(rows):
         if row.blank:
             continue
-        reason = _explain_row_inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
+        reason = explain_row(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
         if reason:
-            _refuse_reading(row, header, numeric, file)
+            filled = [cell for cell in row.cells if cell.strip()]
+            if len(filled) == 1:
+                refuse_other_separator(file, row.row, filled[0], width, numeric)
             left_out[row.row] = reason
         else:
             body.append(row)
     return body, left_out
-
-
-def _refuse_reading(row: CsvRecord, header: CsvRecord, numeric: set[int], file: str) -> None:
-    """Refuse to leave out a row that is a reading when its single cell is divided at another separator.
-
-    Raises:
-        DatasetError: It has as many cells as the headings then, and numbers where the table has them.
-    """
-    filled = [cell for cell in row.cells if cell.strip()]
-    if len(filled) != 1:
-        return
-    width = len([cell for cell in header.cells if cell.strip()])
-    for separator in SEPARATORS:
-        cells = split_cells(filled[0].strip().strip('"'), separator)
-        numbers = sum(map(is_measured, cells))
-        if len(cells) == width > 1 and numbers >= max(len(numeric), 1):
-            raise other_separator_error(file, row.row, filled[0])
-
-
-def _refuse_other_headings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> None:
-    """Refuse a row of words in every column among rows of numbers, unless it is the headings again.
-
-    Raises:
-        DatasetError: There is such a row.
-    """
-    width = max(sum(bool(cell.strip()) for cell in header.cells), 2)
-    last = max((i for i, row in enumerate(rows) if count_words_and_numbers(row)[1]), default=0)
-    for row in rows[1:last]:
-        words, numbers = count_words_and_numbers(row)
-        if words >= width > numbers == 0 and len({*row.cells}) > 1 and not is_units(row) and not is_same(row, header):
-            raise DatasetError(
-                f"{file}, row {row.row}: every column has words ({shown(' '.join(row.cells))}) above further rows of "
-                f"numbers, as headings do, but not those of row {header.row}; put what is below into a file of its own, or "
-                "delete the row if its columns are the same."
-            )
 
 
 def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int:
@@ -241,14 +181,3 @@ def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) ->
     ]
     is_block = start > 0 and len(last) <= _MOST_STATISTICS and len(set(labels)) == len(labels)
     return start if is_block and all(is_summary(row.cells) for row in last) else end
-
-
-def _explain_row_inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:
-    """Return why a row among the readings is none; empty where it is one."""
-    words, numbers = count_words_and_numbers(row)
-    if not numbers and (is_same(row, header) or is_units(row)):
-        return AGAIN
-    if not numbers and words == 1 and len(numeric) > 1:
-        return BETWEEN
-    at_number = [cell for i, cell in enumerate(row.cells) if i in numeric]
-    return _INSIDE if is_summary(at_number) else ""

@@ -9,23 +9,19 @@ from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
 from bowdenfit.files.headings import heading_of, repeated_heading
-from bowdenfit.files.layout import choose_separator
 from bowdenfit.files.measured_cells import is_measured, split_measured
 from bowdenfit.files.pivot import unpivot
-from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, make_account
+from bowdenfit.files.row_account import RowAccount, make_account
+from bowdenfit.files.sheet_text import explain_lines, split_rows
 from bowdenfit.files.table_parts import TableParts, split_table
 from bowdenfit.files.text_file import (
     CsvRecord,
     Line,
     check_encoding,
-    comment_mark,
-    declared_separator,
     first_bytes,
     first_lines,
-    is_blank,
     refuse_long_row,
     short_row_error,
-    split_records,
 )
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
@@ -35,7 +31,7 @@ _FIRST_BYTES = 1 << 18  # judged: bytes that hold the first rows
 _MOST_COLUMNS = 2000  # judged: tables of forces have some ten; each is compared with every spelling of a heading
 _MOST_CELLS = 150_000  # measured: each takes some 60 us; ring-downs of 50 s at 1 kHz have as many
 _LARGEST = 10e6  # bytes; some fifty times as many are needed to read them
-_SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
+_COMMENTS = "#"  # % may be a heading
 
 
 @dataclass(frozen=True)
@@ -120,10 +116,7 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
     check_encoding(path)
     if most is not None and len(all_lines) > 1 and not all_lines[-1].ended:
         all_lines = all_lines[:-1]
-    declared, lines = declared_separator(all_lines, name)
-    lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
-    separator = declared or choose_separator(lines)
-    rows = list(split_records(lines, separator, len(lines)))
+    separator, rows = split_rows(all_lines, name, _COMMENTS, len(all_lines))
     for row in rows:
         if not row.closed:
             raise DatasetError(
@@ -210,7 +203,7 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
     fewest = _fewest_cells(parts.body, len(header))
     cells = tuple(wrong_width.read_all(lambda row: _cells(name, header, row, in_column, fewest), parts.body, nothing))
     wrong_width.refuse()
-    below = (*parts.units, *[""] * len(header))[: len(header)]
+    below = (*parts.headings.units, *[""] * len(header))[: len(header)]
     units = tuple(
         _unit_of(heading, unit, header, [row[i] for row in cells])
         for i, (heading, unit) in enumerate(zip(header, below, strict=True))
@@ -220,12 +213,12 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
     if long := unpivot(header, units, cells):
         header, units, cells, remarks = long.header, long.units, long.rows, (f"{name}: {long.remark}",)
     errors = _errors_in_cells(header, cells)
-    return RawTable(name, header, parts.headings[0].row, cells, units, account, errors, remarks)
+    return RawTable(name, header, parts.headings.rows[0].row, cells, units, account, errors, remarks)
 
 
 def _header(parts: TableParts, file: str) -> tuple[str, ...]:
     """Return the headings, without the empty ones behind the last."""
-    header, row = parts.names, parts.headings[0].row
+    header, row = parts.headings.names, parts.headings.rows[0].row
     while not header[-1]:
         header = header[:-1]
     if all(is_plain_number(column) for column in header if column):
@@ -306,20 +299,8 @@ def _behind(row: CsvRecord, width: int) -> list[str]:
 
 
 def _account(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], parts: TableParts, width: int) -> RowAccount:
-    starts = {row.row: row for row in rows}
-    reasons: dict[int, tuple[str, str]] = {}
-    for line in lines:
-        row = starts.get(line.row)
-        if line.text.strip().strip('"').lower().startswith("sep="):
-            reasons[line.row] = _SEPARATOR, ""
-        elif comment_mark(line.text) == "#":
-            reasons[line.row] = COMMENT, ""
-        elif row is None:
-            reasons[line.row] = (BLANK, "") if is_blank(line.text) else (_CONTINUED, "")
-        elif row.blank:
-            reasons[line.row] = BLANK, ""
-        elif row.row in parts.left_out:
-            reasons[row.row] = parts.left_out[row.row], " ".join(filter(None, map(str.strip, row.cells)))
+    texts = {row.row: " ".join(filter(None, map(str.strip, row.cells))) for row in rows}
+    left_out = {row: (reason, texts[row]) for row, reason in parts.left_out.items()}
+    reasons = explain_lines(lines, rows, left_out, _COMMENTS)
     beside = [(row.row, " ".join(text)) for row in parts.body if (text := _behind(row, width))]
-    over = [row.row for row in parts.headings]
-    return make_account(name, len(lines), over, reasons, (*parts.beside, *beside))
+    return make_account(name, len(lines), [row.row for row in parts.headings.rows], reasons, (*parts.beside, *beside))

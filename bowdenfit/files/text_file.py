@@ -225,7 +225,6 @@ def _lines(data: bytes, encoding: str, start: int, most: int | None = None) -> l
 SEPARATORS = ("\t", ";", ",", "|", " ")
 """What may stand between columns, the surer first; a blank is any run of blanks and tabs."""
 
-_READING = re.compile(r"(?:[-+]?\d[\d.,:/eE+ TZ-]*|[-+]?[.,]\d+(?:[eE][-+]?\d+)?|nan)?", re.IGNORECASE)  # or a date
 _END = "\x00"  # stands in no text file, and so only in a row of its own unless a quote before it is open
 
 
@@ -288,21 +287,6 @@ def split_cells(line: str, separator: str) -> list[str]:
         return next(csv.reader([line.rstrip("\r\n")], delimiter=separator, skipinitialspace=True), [])
     except csv.Error:  # a cell is too long
         return [line]
-
-
-def holds_other_row(text: str, width: int) -> bool:
-    """Return whether a text is a row of numbers for that many columns when it is divided at one of the separators."""
-    pieces = (split_cells(text.strip().strip('"'), separator) for separator in SEPARATORS if width > 1 and not is_blank(text))
-    return any(len(cells) == width and all(map(_READING.fullmatch, map(str.strip, cells))) for cells in pieces)
-
-
-def other_separator_error(file: str, row: int, text: str) -> DatasetError:
-    """Return the refusal of a row that would be left out although it is one of readings, separated otherwise."""
-    return DatasetError(
-        f"{file}, row {row}: {shown(text)} looks like a row of readings, but its cells are not separated as those of the other "
-        "rows; the usual causes are rows that were pasted from another file, and quotation marks around a whole row. Separate "
-        "its columns as in the other rows, or begin the row with # if it is a remark."
-    )
 
 
 def _whole_record(lines: Iterator[str], separator: str) -> tuple[int, list[str]] | None:

@@ -196,7 +196,24 @@ def test_a_bad_cell_in_a_short_recording_never_makes_headings_of_the_samples_abo
         read_channels(tmp_path / "run.csv")
 
 
-@pytest.mark.parametrize("above", [["Channel;AI0;AI1", "Range;500;500", "Gain;1;1"], ROWS[:1]])
-def test_numbers_over_headings_in_words_that_do_not_repeat_themselves_are_no_part_of_them(tmp_path, above):
+def test_settings_over_the_headings_of_a_recording_are_no_part_of_them(tmp_path):
+    above = ["Channel;AI0;AI1", "Range;500;500", "Gain;1;1"]
     (tmp_path / "run.csv").write_text("\n".join([*above, *TABLE]) + "\n", encoding="utf-8")
     assert [channel.name for channel in read_channels(tmp_path / "run.csv").channels] == ["F_in", "F_out"]
+
+
+@pytest.mark.parametrize("read", [read_csv, read_channels])
+def test_other_headings_between_the_rows_are_refused_in_one_sentence(tmp_path, read):
+    for rows, sentence in ((20, "row 22: every column has words"), (9, "row 2: it has numbers .* above the headings in row 1")):
+        lines = [CLOCKED, *RECORDED[:rows], "trial;load;loss", *RECORDED[rows:]]
+        (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with pytest.raises(DatasetError, match=sentence):
+            read(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("read", [read_csv, read_channels])
+def test_units_once_more_between_the_rows_are_left_out_with_the_headings(tmp_path, read):
+    head = ["Time;F_in;F_out", "s;N;N"]
+    (tmp_path / "run.csv").write_text("\n".join([*head, *RECORDED[:20], *head, *RECORDED[20:]]) + "\n", encoding="utf-8")
+    (left_out,) = read(tmp_path / "run.csv").account.left_out
+    assert (left_out.why, left_out.ranges) == ("the headings again", ((23, 24),))

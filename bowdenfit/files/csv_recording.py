@@ -30,12 +30,10 @@ from bowdenfit.files.layout import Layout, find_layout
 from bowdenfit.files.pieces import never_falls
 from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, make_account
 from bowdenfit.files.sheet_columns import (
-    RowKind,
     SheetColumns,
     SheetRows,
     make_channels,
-    read_cells,
-    read_columns,
+    read_arrays,
 )
 from bowdenfit.files.sheet_rows import is_summary, refuse_other_separator
 from bowdenfit.files.sheet_text import choose_decimal, explain_lines, split_rows
@@ -122,10 +120,9 @@ def read(path: Path) -> ChannelFile:
     if stop <= sheet.start:
         raise DatasetError(f"{path.name} breaks off before its first whole row of numbers; copy or export it again.")
     split = last[0].start if last else stop
-    read_plain = _read_short if split - sheet.start < _FEW_BYTES else _read_long
-    plain = read_plain(path, sheet, split) if split > sheet.start else {}
+    plain = _read_plain(path, sheet, split) if split - sheet.start > _FEW_BYTES else None
     quick = (sheet.start, 0) if not plain else (split, sum(map(len, next(iter(plain.values())))))
-    columns = read_columns(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
+    columns = read_arrays(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
     channels, left_out = make_channels(sheet.layout, columns)
     timed, clock = assign_rate_times(channels, sheet.metadata)
     row = count_rows_before(path, stop) + 1 if cut else 0
@@ -134,18 +131,7 @@ def read(path: Path) -> ChannelFile:
     return replace(whole, account=_account_rows(path, sheet, columns, quick, stop))
 
 
-def _read_short(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
-    """Return what `_read_long` would of few rows, reading cell by cell, which is quicker than loading pandas."""
-    cells = read_cells(_rows(path, sheet, sheet.start, stop, None))
-    row_kinds = np.array(cells.row_kinds)
-    if not np.all(np.isin(row_kinds, [RowKind.DATA, RowKind.SEPARATORS, RowKind.SPACE])):
-        return None
-    columns = {i: np.array(values, dtype=float) for i, values in cells.numbers.items()}
-    columns |= {i: np.array(texts, dtype=object) for i, texts in cells.dates.items()}
-    return {i: [values[row_kinds != RowKind.SPACE]] for i, values in columns.items()}
-
-
-def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
+def _read_plain(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
     """Return the pieces of each column up to a byte as pandas reads them, dates as text; None if it cannot read a cell."""
     pandas = load_library("pandas", "CSV")
     kinds = sheet.layout.kinds
@@ -263,7 +249,9 @@ def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separato
         return _take_headings_from_comment(layout, separator, above)
     for row in () if layout.fits else below:
         refuse_long_row(path.name, row.row, row.cells, layout.room)
-    return layout.inside if layout.named else _take_headings_from_comment(layout, separator, above)
+    if not layout.named:
+        return _take_headings_from_comment(layout, separator, above)
+    return replace(layout, headings=layout.headings[: layout.room], kinds=layout.kinds[: layout.room])
 
 
 def _take_headings_from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:

@@ -12,7 +12,7 @@ from bowdenfit.files.channels import Channel, ChannelFile, load_library, refuse_
 from bowdenfit.files.headings import Quantity, find_candidates
 from bowdenfit.files.layout import find_layout
 from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, make_account
-from bowdenfit.files.sheet_columns import SheetRows, cell_text, make_channels, read_columns
+from bowdenfit.files.sheet_columns import SheetRows, cell_text, make_channels, read_arrays
 from bowdenfit.files.tables import RawTable, make_table
 from bowdenfit.files.text_file import CsvRecord, Line
 from bowdenfit.words import quoted, shown
@@ -87,7 +87,7 @@ def _read_sheet(
         return (), [], None
     start = layout.first.row - 1
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
-    columns = read_columns(rows)
+    columns = read_arrays(rows)
     channels, left_out = make_channels(layout, columns)
     above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i + 1 not in layout.over}
     account = make_account(file, start + columns.rows, layout.over, above | columns.left_out, columns.beside)

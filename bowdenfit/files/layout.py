@@ -213,12 +213,6 @@ class Layout:
         """Whether no column stands outside the headings, as happens where decimal commas are taken for separators."""
         return not self.named or all(kind in ("blank", "text") for kind in self.kinds[self.room :])
 
-    @property
-    def inside(self) -> "Layout":
-        """The layout without columns outside the headings, in which only remarks stand."""
-        room = self.room if self.named and self.fits else len(self.kinds)
-        return replace(self, headings=self.headings[:room], kinds=self.kinds[:room])
-
     def name(self, column: int) -> str:
         """Return what a column is called, by its place where it has no heading."""
         return self.headings[column].name or f"column{column + 1}"
@@ -233,53 +227,54 @@ def find_layout(rows: Sequence[CsvRecord], decimal: str, place: str) -> Layout |
     Raises:
         DatasetError: A unit below a heading is another than the one in it.
     """
-    headings = find_headings(rows, place, groups=False)
-    above = headings.rows[-1].row if headings else 0
-    data = [row for row in rows if row.row > above and _is_data(row, decimal)]
+    filled = [row for row in rows if not row.blank]
+    headings = find_headings(filled, place, groups=False)
+    data = _rows_of_data(filled, headings, decimal)
     if not data:
         return None
-    if headings:
-        refuse_readings_above([row for row in rows if not row.blank], headings, place, _MOST_NUMBERS_OVER)
-        # A row of words among the data counts too.
-        data = [row for row in rows if above < row.row <= data[-1].row and not row.blank and not is_summary(row.cells)]
+    if headings and _can_head(headings.header, sorted(map(_filled_width, data))[len(data) // 2]):
+        refuse_readings_above(filled, headings, place, _MOST_NUMBERS_OVER)
+    else:
+        headings, data = _find_numeric_headings(filled, data, decimal, place)
     kinds = _kinds_of_columns(data, decimal)
-    width = sorted(map(_filled_width, data))[len(data) // 2]
-    if headings is None or not _can_head(headings.header, width):
-        return _find_layout_by_numbers(rows, data, kinds, decimal, place)
-    first = next(row for row in rows if row.row > headings.rows[-1].row and not row.blank)
-    return _name_columns(first, headings, data, kinds, decimal)
-
-
-def _find_layout_by_numbers(
-    rows: Sequence[CsvRecord], data: Sequence[CsvRecord], kinds: Sequence[Kind], decimal: str, place: str
-) -> Layout:
-    """Return the layout of a sheet without headings in words: numbers over the columns are its headings, or there are none."""
-    start = next((i for i, row in enumerate(data) if _agrees(row, kinds, decimal)), 0)
-    first, data = data[start], data[start:]
-    above = [replace(row, cells=drop_label(row.cells)) for row in rows if row.row < first.row and not row.blank]
-    if not (above and _can_head(above[-1], len(kinds))):
-        if not _is_numeric_heading(data, decimal):
-            return Layout(decimal, first, tuple(Heading(f"column{i + 1}") for i in range(len(kinds))), tuple(kinds))
-        above, data, first = [*above, first], data[1:], data[1]
-    headings = read_headings(above, len(above) - 1, place)
-    return _name_columns(first, headings, data, kinds, decimal)
-
-
-def _name_columns(
-    first: CsvRecord,
-    headings: Headings,
-    data: Sequence[CsvRecord],
-    kinds: Sequence[Kind],
-    decimal: str,
-) -> Layout:
-    """Return the layout of columns under their headings, in which nameless clocks have a name."""
-    written = [heading_of(*pair) for pair in zip_longest(headings.names, headings.units[: len(headings.names)], fillvalue="")]
+    if headings is None:
+        return Layout(decimal, data[0], tuple(Heading(f"column{i + 1}") for i in range(len(kinds))), kinds)
+    units = headings.units[: len(headings.names)]
+    written = [heading_of(name, unit) for name, unit in zip_longest(headings.names, units, fillvalue="")]
     named = (*written, *[Heading("")] * len(kinds))[: len(kinds)]
     rising = [_rises(data, i, decimal) for i in range(len(kinds))]
-    paired = pair_clocks(named, rising, [kind == "number" for kind in kinds])
-    cells = max(len(row.cells) for row in headings.rows)
-    over = tuple(row.row for row in headings.rows)
-    return Layout(decimal, first, paired, tuple(kinds), True, headings.header, cells, over)
+    return Layout(
+        decimal,
+        data[0],
+        pair_clocks(named, rising, [kind == "number" for kind in kinds]),
+        kinds,
+        True,
+        headings.header,
+        max(len(row.cells) for row in headings.rows),
+        tuple(row.row for row in headings.rows),
+    )
+
+
+def _rows_of_data(filled: Sequence[CsvRecord], headings: Headings | None, decimal: str) -> list[CsvRecord]:
+    """Return the rows that hold more numbers and dates than words, and below headings those between them too."""
+    above = headings.rows[-1].row if headings else 0
+    below = [row for row in filled if row.row > above and not is_summary(row.cells)]
+    data = [row for row in below if _holds_data(row, decimal)]
+    return [row for row in below if row.row <= data[-1].row] if headings and data else data
+
+
+def _find_numeric_headings(
+    filled: Sequence[CsvRecord], data: list[CsvRecord], decimal: str, place: str
+) -> tuple[Headings | None, list[CsvRecord]]:
+    """Return headings that are numbers, or numbers and words, right over the data, and the rows below them; None without."""
+    kinds = _kinds_of_columns(data, decimal)
+    start = next((i for i, row in enumerate(data) if _agrees(row, kinds, decimal)), 0)
+    above = [replace(row, cells=drop_label(row.cells)) for row in filled if row.row < data[start].row]
+    if not (above and _can_head(above[-1], len(kinds))):
+        if not _is_numeric_heading(data[start:], decimal):
+            return None, data[start:]
+        above, start = [*above, data[start]], start + 1
+    return read_headings(above, len(above) - 1, place), data[start:]
 
 
 def is_index(values: Vector) -> bool:
@@ -287,10 +282,10 @@ def is_index(values: Vector) -> bool:
     return len(values) > 1 and values[0] in (0, 1) and bool(np.all(values[1:] == values[:-1] + 1))
 
 
-def _is_data(row: CsvRecord, decimal: str) -> bool:
-    """Return whether a row holds more numbers and dates than words, and no statistics."""
+def _holds_data(row: CsvRecord, decimal: str) -> bool:
+    """Return whether a row holds more numbers and dates than words."""
     kinds = [classify_cell(cell, decimal) for cell in row.cells]
-    return kinds.count("number") + kinds.count("date") > kinds.count("text") and not is_summary(row.cells)
+    return kinds.count("number") + kinds.count("date") > kinds.count("text")
 
 
 def _agrees(row: CsvRecord, columns: Sequence[Kind], decimal: str) -> bool:
@@ -299,11 +294,11 @@ def _agrees(row: CsvRecord, columns: Sequence[Kind], decimal: str) -> bool:
     return all("blank" in pair or pair[0] == pair[1] for pair in zip(kinds, columns, strict=False))
 
 
-def _kinds_of_columns(data: Sequence[CsvRecord], decimal: str) -> list[Kind]:
+def _kinds_of_columns(data: Sequence[CsvRecord], decimal: str) -> tuple[Kind, ...]:
     """Return the kind that most cells of each column have, blank ones aside."""
     columns = zip_longest(*(row.cells for row in data), fillvalue="")
     of_cells: list[list[Kind]] = [[classify_cell(cell, decimal) for cell in column] for column in columns]
-    return [max(_KINDS, key=kinds.count) if {*kinds} - {"blank"} else "blank" for kinds in of_cells]
+    return tuple(max(_KINDS, key=kinds.count) if {*kinds} - {"blank"} else "blank" for kinds in of_cells)
 
 
 def _can_head(row: CsvRecord, width: int) -> bool:

@@ -1,6 +1,6 @@
 """From the rows of a sheet, whatever program wrote it, to channels.
 
-`read_cells` reads cell by cell and notes the kind of each row; `read_columns` decides by these kinds where the data end and
+`_read_rows` reads cell by cell and notes the kind of each row; `read_arrays` decides by these kinds where the data end and
 what is a remark; `make_channels` names the columns and gives them their clocks.
 """
 
@@ -132,13 +132,13 @@ def make_channels(layout: Layout, sheet_columns: SheetColumns) -> tuple[tuple[Ch
     return assign_clocks(trim_tails(named)) if named else (), remarks
 
 
-def read_columns(sheet: SheetRows) -> SheetColumns:
+def read_arrays(sheet: SheetRows) -> SheetColumns:
     """Return the numbers of each column, and what was left out below the data, between the rows and beside them.
 
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
-    cells = read_cells(sheet)
+    cells = _read_rows(sheet)
     stop = _find_data_end(cells.row_kinds)
     left_out, beside = _explain_rows(sheet, cells, stop)
     dropped = {RowKind.COMMENT, RowKind.REMARK} | ({RowKind.SPACE} if sheet.of_text else set())
@@ -265,7 +265,7 @@ def _describe_left_out(
     return sentences + ([f"Notes next to the columns were left out: {few(texts)}."] if texts else [])
 
 
-def read_cells(sheet: SheetRows) -> SheetCells:
+def _read_rows(sheet: SheetRows) -> SheetCells:
     """Return all cells of a sheet."""
     kinds, decimal = sheet.layout.kinds, sheet.layout.decimal
     numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}

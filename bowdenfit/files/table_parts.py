@@ -103,7 +103,7 @@ def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> 
         return [row for row in rows if not row.blank], {}
     end = max(i for i, fits in enumerate(agree) if fits) + 1
     end = min(end, _statistics_start(rows, end, numeric))
-    while end < stop and not rows[end].blank and _misfits(rows[end], numeric):
+    while end < stop and _count_in_columns(rows[end], numeric)[1] and not is_summary(rows[end].cells):
         end += 1  # a bad cell in the last rows is refused by name, not left out
     body, left_out = [], dict[int, str]()
     for i, row in enumerate(rows):
@@ -130,9 +130,9 @@ def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) ->
     for i, row in enumerate(rows):
         if seen and rows[i - 1].blank and is_words(row) and not count_words_and_numbers(row)[1] and row.cells != header.cells:
             numeric = _numeric_columns(rows[:i])
-            filled = sorted(_filled(above, numeric) for above in rows[:i] if _agrees(above, numeric))
+            filled = sorted(_count_in_columns(above, numeric)[1] for above in rows[:i] if _agrees(above, numeric))
             usual = filled[len(filled) // 2] if filled else 1
-            below = sum(_agrees(above, numeric) and _filled(above, numeric) >= usual for above in rows[i + 1 :])
+            below = sum(_agrees(above, numeric) and _count_in_columns(above, numeric)[1] >= usual for above in rows[i + 1 :])
             if below >= max(_FEWEST_ALIKE, _SHARE_ALIKE * len(filled)):
                 raise DatasetError(
                     f"{file}, row {row.row}: it has words ({shown(' '.join(row.cells))}) behind a blank row, and {below} "
@@ -157,19 +157,13 @@ def _numeric_columns(rows: Sequence[CsvRecord]) -> set[int]:
 
 def _agrees(row: CsvRecord, numeric: set[int]) -> bool:
     """Return whether a row has numbers where the table has them, and no words there."""
-    cells = [row.cells[i] for i in numeric if i < len(row.cells) and row.cells[i].strip().lower() not in BLANK]
-    return bool(cells) and 2 * len(cells) >= len(numeric) and all(map(is_measured, cells))
+    words, numbers = _count_in_columns(row, numeric)
+    return not words and numbers > 0 and 2 * numbers >= len(numeric)
 
 
-def _filled(row: CsvRecord, numeric: set[int]) -> int:
-    """Return how many of the columns of numbers have one in a row."""
-    return sum(i < len(row.cells) and is_measured(row.cells[i]) for i in numeric)
-
-
-def _misfits(row: CsvRecord, numeric: set[int]) -> bool:
-    """Return whether a row holds a reading among words, as one with a bad cell does, and no statistics."""
-    numbers = any(is_measured(row.cells[i]) for i in numeric if i < len(row.cells) and row.cells[i].strip())
-    return numbers and not is_summary(row.cells)
+def _count_in_columns(row: CsvRecord, numeric: set[int]) -> tuple[int, int]:
+    """Return how many words and how many numbers a row has where the table has numbers."""
+    return count_words_and_numbers(replace(row, cells=[cell for i, cell in enumerate(row.cells) if i in numeric]))
 
 
 def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) -> int:

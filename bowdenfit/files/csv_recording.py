@@ -194,10 +194,7 @@ def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, lis
             filled = [""] if is_blank(text) else split_cells(text, sheet.separator)
             yield None if comment_mark(text) else filled if text.strip(spaces) else []
 
-    def number(position: int) -> int:
-        return count_rows_before(path, start) + position + 1
-
-    return SheetRows(path.name, sheet.layout, cells(), number, True, before)
+    return SheetRows(path.name, sheet.layout, cells(), count_rows_before(path, start) + 1, True, before)
 
 
 def _is_cut(lines: Sequence[Line], separator: str) -> bool:

@@ -86,7 +86,7 @@ def _read_sheet(
     if layout is None:
         return (), [], None
     start = layout.first.row - 1
-    rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
+    rows = SheetRows(place, layout, chain(first[start:], iterator), layout.first.row)
     columns = read_arrays(rows)
     channels, left_out = make_channels(layout, columns)
     above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i + 1 not in layout.over}

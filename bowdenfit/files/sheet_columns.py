@@ -6,7 +6,7 @@ what is a remark; `make_channels` names the columns and gives them their clocks.
 
 import math
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
 from enum import IntEnum
@@ -54,7 +54,7 @@ class SheetRows:
         place: File and sheet, for errors.
         layout: Headings and kinds of the columns.
         rows: Their cells, text or as the library gives them; None for a comment.
-        number: The number in the file of the row at a position, from 0.
+        first: Number of the first of them in the file.
         of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
         before: Numbers or dates of each column that have been read from the rows before, in pieces; taken out.
     """
@@ -62,7 +62,7 @@ class SheetRows:
     place: str
     layout: Layout
     rows: Iterable[Sequence[Any] | None]
-    number: Callable[[int], int]
+    first: int
     of_text: bool = False
     before: dict[int, list[np.ndarray]] | None = None
 
@@ -179,9 +179,9 @@ def _explain_rows(
     for position, kind in enumerate(cells.row_kinds):
         if position < stop and kind in (RowKind.DATA, RowKind.SEPARATORS):
             continue
-        row = CsvRecord(sheet.number(position), 0, cells.texts.get(position, []))
+        row = CsvRecord(sheet.first + position, 0, cells.texts.get(position, []))
         text = " ".join(filter(None, map(str.strip, row.cells)))
-        reason = explain_row(row, layout.header, layout.numeric) if kind == RowKind.WORDS else ""
+        reason = explain_row(row, layout.header, layout.numeric) if kind in (RowKind.WORDS, RowKind.STATISTICS) else ""
         if kind in _BLANK_KINDS:
             left_out[row.row] = (COMMENT if kind == RowKind.COMMENT else BLANK), ""
         elif position >= stop or reason:
@@ -216,21 +216,16 @@ def _find_data_end(row_kinds: bytearray) -> int:
 
     Below the data stand statistics, words alone, a block in whose every row are words, or a few last rows after a blank.
     """
-    end = _strip_end(row_kinds, len(row_kinds), _BLANK_KINDS)
+    end = len(row_kinds.rstrip(bytes(_BLANK_KINDS)))
     label = row_kinds.find(RowKind.STATISTICS, max(0, end - _MOST_SUMMARY_ROWS), end)
-    end = _strip_end(row_kinds, end if label < 0 else label, (*_BLANK_KINDS, RowKind.WORDS))
-    blocks = list(_split_at_blank_rows(row_kinds[:end]))
+    above = row_kinds[: end if label < 0 else label].rstrip(bytes((*_BLANK_KINDS, RowKind.WORDS)))
+    blocks = list(_split_at_blank_rows(above))
     while len(blocks) > 1 and all(kind in _OF_TEXT for kind in row_kinds[slice(*blocks[-1])]):
         blocks.pop()
     sizes = [stop - start for start, stop in blocks]
     if len(blocks) == 2 and sizes[1] <= _MOST_ROWS_AFTER_BLANK and sizes[0] > 2 * sizes[1] + 2:
         blocks.pop()
     return blocks[-1][1] if blocks else 0
-
-
-def _strip_end(row_kinds: bytearray, end: int, kinds: Sequence[RowKind]) -> int:
-    """Return the position behind the last row before `end` that is of no such kind."""
-    return len(row_kinds[:end].rstrip(bytes(kinds)))
 
 
 def _split_at_blank_rows(row_kinds: bytearray) -> Iterator[tuple[int, int]]:
@@ -254,7 +249,7 @@ def _describe_left_out(
     sentences = [f"{comments} comment lines between the rows of data were left out."] if comments else []
     below = [i for i in range(stop, len(row_kinds)) if row_kinds[i] not in _BLANK_KINDS]
     if below:
-        top, bottom = sheet.number(below[0]), sheet.number(below[-1])
+        top, bottom = sheet.first + below[0], sheet.first + below[-1]
         place = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
         sentences.append(f"{place} left out: they are below the data, as statistics are.")
     if sheet.of_text:

@@ -217,3 +217,11 @@ def test_units_once_more_between_the_rows_are_left_out_with_the_headings(tmp_pat
     (tmp_path / "run.csv").write_text("\n".join([*head, *RECORDED[:20], *head, *RECORDED[20:]]) + "\n", encoding="utf-8")
     (left_out,) = read(tmp_path / "run.csv").account.left_out
     assert (left_out.why, left_out.ranges) == ("the headings again", ((23, 24),))
+
+
+@pytest.mark.parametrize("read", [read_csv, read_channels])
+def test_statistics_between_the_rows_are_left_out(tmp_path, read):
+    rows = [f"{i / 10:.1f};{50 + i % 7}.5;40.25" for i in range(120)]
+    (tmp_path / "run.csv").write_text("\n".join([CLOCKED, *rows[:60], "Mean;53.5;40.25", *rows[60:]]) + "\n", encoding="utf-8")
+    (left_out,) = read(tmp_path / "run.csv").account.left_out
+    assert (left_out.why, left_out.ranges) == ("statistics between the rows", ((62, 62),))

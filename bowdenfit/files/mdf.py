@@ -1,8 +1,5 @@
 """MDF measurement files of ASAM (Vector CANape, ETAS INCA, and many data loggers)."""
 
-import gc
-import sys
-import traceback
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -63,25 +60,9 @@ def _open(asammdf: Any, path: Path) -> Iterator[Any]:
     with path.open("rb") as stream:
         source = path if stream.read(5) == b"UnFin" else stream
         stream.seek(0)
-        with _drop_half_read():
-            file = asammdf.MDF(source, process_bus_logging=False)
+        file = asammdf.MDF(source, process_bus_logging=False)
         with file:
             yield file
-
-
-@contextmanager
-def _drop_half_read() -> Iterator[None]:
-    """Drop what the library holds of a file that it could not open; its finalizer fails then, and would print so."""
-    hook = sys.unraisablehook
-    try:
-        yield
-    except Exception as error:
-        sys.unraisablehook = lambda _: None
-        traceback.clear_frames(error.__traceback__)
-        gc.collect()
-        raise
-    finally:
-        sys.unraisablehook = hook
 
 
 def _find_channels(file: Any, left_out: UnreadNames) -> list[tuple[int, int]]:

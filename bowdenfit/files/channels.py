@@ -125,7 +125,26 @@ def make_channel_file(
             f"{path.name} holds no recording that can be read: no channel with several numbers. "
             f"{' '.join((*sentences, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
         )
-    return ChannelFile(path, kind, make_names_unique(channels), sentences)
+    aligned, apart = align_starts(channels)
+    if apart:
+        sentences = (*sentences, f"{path.name}: its channels start up to {apart:.3g} s apart; each is read at its own times.")
+    return ChannelFile(path, kind, make_names_unique(aligned), sentences)
+
+
+def align_starts(channels: Sequence[Channel]) -> tuple[list[Channel], float]:
+    """Channels whose times count from the same moment, where they overlap and say when they start; and how far starts differ.
+
+    Channels that do not overlap, such as those of runs one after the other, keep their times.
+    """
+    dated = [channel for channel in channels if channel.time is not None and channel.start is not None and len(channel.time)]
+    aligned, first, end, apart = {id(channel): channel for channel in channels}, 0.0, -np.inf, 0.0
+    for channel in sorted(dated, key=lambda channel: channel.start or 0.0):
+        assert channel.time is not None and channel.start is not None  # chosen above
+        first = channel.start if channel.start > end else first
+        end, late = max(end, channel.start + float(channel.time[-1])), channel.start - first
+        if late > 0:
+            aligned[id(channel)], apart = replace(channel, time=channel.time + late, start=first), max(apart, late)
+    return list(aligned.values()), apart
 
 
 def load_library(module: str, kind: str) -> ModuleType:

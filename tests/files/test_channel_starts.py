@@ -1,4 +1,4 @@
-"""Channels of one file that start at different moments are read at their own times; runs one after the other stay as they are."""
+"""Channels of one file that start at different moments are read at their own times; runs one after the other are not moved."""
 
 import numpy as np
 import pytest

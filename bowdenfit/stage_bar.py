@@ -29,12 +29,14 @@ class Watch:
         remark: Clause on what is saved; the folder follows.
         bar: Options of the progress bar.
         show: Moves the bar by what the function reports.
+        whole: File in the results folder that says that its fit is whole, but for figures; empty if there is none.
     """
 
     kept: str
     remark: str
     bar: Mapping[str, Any]
     show: Callable[..., None]
+    whole: str = ""
 
 
 class StageLine(logging.Handler):

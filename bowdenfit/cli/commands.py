@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import version
 from inspect import Parameter as Stated
@@ -28,8 +29,8 @@ import bowdenfit as bf
 from bowdenfit import results
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
 from bowdenfit.cli.running import requested, watch_verb
-from bowdenfit.cli.stage_line import print_stages, say_beside_stages, show_stages
-from bowdenfit.cli.terminal import say
+from bowdenfit.cli.stage_line import above_stages, print_stages, say_beside_stages, show_stages
+from bowdenfit.cli.terminal import NoReaderError, say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES, read_answers
@@ -154,17 +155,22 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
     reply = _reply_from_kept(verb, answers, request)
     if reply is None or (form == "json" and reply.page is None) or (form == "csv" and reply.csv is None):
         request[first] = _load_fits(source) if is_of_fit else source
-        reply = _compute_reply(verb, request, source)
+        reply = _compute_reply(verb, request, source, form)
     if verb.warns and isinstance(source, Path):
         key = COEFFICIENT_TROUBLES if verb.needs_coefficients else TROUBLES
         troubles = answers[key] if key in answers else _list_troubles(request[first], source, verb.needs_coefficients)
         reply = _add_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
-    for piece in reply.pieces:
-        say(piece, nl=False)
-    say(_to_json(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
+    _print_answer(reply, form)
     for note in reply.notes:
         say(note, err=True)
     return reply.exit_code
+
+
+def _print_answer(reply: Reply, form: str) -> None:
+    """Print an answer for people, or as "json" or "csv"."""
+    for piece in reply.pieces:
+        say(piece, nl=False)
+    say(_to_json(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
 
 
 def _refuse_flags_of_others(flags: str) -> None:
@@ -194,8 +200,8 @@ def _reply_from_kept(verb: Verb, answers: dict[str, Any], request: dict[str, Any
         return None
 
 
-def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
-    """Call the verb's function, and return its reply."""
+def _compute_reply(verb: Verb, request: dict[str, Any], source: Any, form: str) -> Reply:
+    """Call the verb's function, and return its reply, without an answer that was printed as soon as it was known."""
     if verb.results and request["output"] is None:
         request["output"] = Path(verb.results) / _results_name(source)
     if request.get("output") is not None:
@@ -207,6 +213,15 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
         request["is_stopped"] = requested.is_set
     if "say" in parameters_of(function):
         request["say"] = say
+    printed: list[Reply] = []
+
+    def print_early(answer: Any) -> None:
+        printed.append(verb.reply(answer, request))
+        with above_stages(), suppress(NoReaderError):
+            _print_answer(printed[-1], form)
+
+    if "answered" in parameters_of(function):
+        request["answered"] = print_early
     if verb.serves:
         answer = function(**request)
     elif verb.watch is None:
@@ -215,7 +230,7 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
     else:
         with watch_verb(request["output"], verb.watch) as progress:
             answer = function(**request, progress=progress)
-    return verb.reply(answer, request)
+    return replace(printed[-1], text="", page=None) if printed else verb.reply(answer, request)
 
 
 def _list_troubles(fit: Any, source: Path, of_coefficients: bool) -> Collection[str]:

@@ -114,6 +114,14 @@ def _end_process() -> None:
         os._exit(INTERRUPTED)
 
 
+def _time_of(path: Path | None) -> int | None:
+    """Return when a file was written; None if there is none."""
+    try:
+        return None if path is None else path.stat().st_mtime_ns
+    except OSError:
+        return None
+
+
 @contextmanager
 def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
     """Yield what to call while something long runs; say how to go on when the user (or the system) stops it.
@@ -128,8 +136,12 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
     """
     refuse_low_memory()
     checkpoint = folder / watch.kept if folder is not None and watch.kept else None
+    whole = folder / watch.whole if folder is not None and watch.whole else None
+    earlier = _time_of(whole)
 
     def how_to_go_on() -> str:
+        if _time_of(whole) not in (None, earlier):
+            return f"{folder} holds the whole fit: bowdenfit report {folder} draws the rest"
         return (
             f"{watch.remark} {folder}: run the same command with --resume"
             if checkpoint is not None and checkpoint.exists()

@@ -36,6 +36,13 @@ def say_beside_stages(sentence: str) -> None:
         say(sentence, err=True)
 
 
+@contextmanager
+def above_stages() -> Iterator[None]:
+    """Let what is printed on standard output stand above the line with the stage, where there is one."""
+    with tqdm.external_write_mode(file=sys.stdout):
+        yield
+
+
 def print_stages() -> None:
     """Print every stage on standard error from now on, with the time of day."""
     handler = logging.StreamHandler(sys.stderr)

@@ -139,6 +139,13 @@ def _read_captions(folder: Path) -> str:
     return read_text(path) if path.is_file() and not path.is_symlink() else ""
 
 
+def record_figure_data(folder: Path) -> None:
+    """Record the checksum of what figures show, which has been written since the fit was."""
+    page = read_page(folder / ANSWERS)
+    del page[CHECKSUM]
+    _write(folder, page | {"of": page["of"] | {FIGURE_DATA: file_checksum(folder / FIGURE_DATA)}})
+
+
 def record_drawn_figures(folder: Path, captions: Mapping[str, str]) -> None:
     """Record which figures have been drawn, with checksums of their files.
 

@@ -19,7 +19,7 @@ from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.outputs import write_text
-from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, write_answers
+from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, record_figure_data, write_answers
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page
 from bowdenfit.results.netcdf import (
     DERIVED,
@@ -50,9 +50,8 @@ def save(
     folder: Path,
     force: bool = False,
     answers: Mapping[str, Any] = MappingProxyType({}),
-    figures: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write posterior.nc, summary.json, what is kept of answers and figures and, last, fit.json.
+    """Write posterior.nc, summary.json, what is kept of answers and, last, fit.json.
 
     Args:
         fit: The fit.
@@ -60,7 +59,6 @@ def save(
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
         answers: Plain data by question, from which they are answered again.
-        figures: Data of figures by name, from which they are drawn again.
 
     Raises:
         StoreError: The folder holds a finished fit already, or cannot be written.
@@ -76,10 +74,23 @@ def save(
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
         page = _fit_text(_fit_page(fit) | {"posterior_crc32": file_checksum(folder / POSTERIOR)}, fit.dataset.measurements)
         (folder / FIGURE_DATA).unlink(missing_ok=True)
-        if figures:
-            write_arrays(folder / FIGURE_DATA, figures)
         write_answers(folder, answers, page)
         write_text(folder / FIT, page)
+
+
+def save_figure_data(figures: Mapping[str, Any], folder: Path) -> None:
+    """Write what figures show beside a finished fit, so that they are drawn again without its model.
+
+    Args:
+        figures: Data of figures by name.
+        folder: The results folder, in which the fit is.
+
+    Raises:
+        StoreError: The folder cannot be written.
+    """
+    with folder_to_write(folder):
+        write_arrays(folder / FIGURE_DATA, figures)
+        record_figure_data(folder)
 
 
 _DAMAGE_ERRORS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)  # over what was changed

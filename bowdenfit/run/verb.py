@@ -14,7 +14,7 @@ from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Purpose, Seed, re
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
-from bowdenfit.results.folder import CHAIN, remove_checkpoint, reserve_folder
+from bowdenfit.results.folder import CHAIN, FIT, remove_checkpoint, reserve_folder
 from bowdenfit.stage_bar import Watch, show_progress_bar
 from bowdenfit.stages import announce_stage
 from bowdenfit.verb import Reply, Verb
@@ -42,6 +42,7 @@ def fit(
     purpose: Purpose = "design",
     progress: Annotated["Callable[[Progress], None] | None", HIDDEN] = None,
     report: Annotated[Callable[[str], None], HIDDEN] = warn,
+    answered: Annotated["Callable[[Fit], object]", HIDDEN] = lambda _: None,
     **reading: Unpack[Reading],
 ) -> "Fit":
     """Fit a data set: least squares, then the posterior, then the design answer. Nothing is written unless `output` says where.
@@ -58,6 +59,7 @@ def fit(
         purpose: What the command's first line and exit code are about: "design", the best length, or "coefficients".
         progress: Called while sampling; a notebook shows one line with stage, clock and progress if omitted.
         report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.
+        answered: Called with the fit as soon as it is known and written, before figures are drawn.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
@@ -77,10 +79,13 @@ def fit(
                 result = run.fit_posterior(data, seed, checkpoint, resume, show)
             else:
                 result = run.fit_classically(data, seed)
-            for sentence in run.write_results(result, folder, figures) if folder is not None else ():
+            for sentence in run.save_results(result, folder) if folder is not None else ():
                 report(sentence)
             if folder is not None and result.converged:
                 remove_checkpoint(folder)
+            answered(result)
+            for sentence in run.draw_results(result, folder, figures) if folder is not None else ():
+                report(sentence)
     return result
 
 
@@ -99,7 +104,7 @@ def _show(bar: Any, progress: "Progress") -> None:
 
 
 _BAR = {"unit": "step", "desc": "sampling", "bar_format": "{desc} {n_fmt} steps, {elapsed}{postfix}"}
-WATCH = Watch(CHAIN, "the checkpoint is kept in", _BAR, _show)
+WATCH = Watch(CHAIN, "the checkpoint is kept in", _BAR, _show, FIT)
 VERB = Verb(
     fit,
     _reply,

@@ -1,4 +1,4 @@
-"""Write the results folder of a finished fit: the fit itself, figures, texts and the report."""
+"""Write the results folder of a finished fit: the fit itself and its texts, and then figures and the report."""
 
 from collections.abc import Callable
 from functools import partial
@@ -20,15 +20,52 @@ from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.answer_cache import record_drawn_figures, record_texts, write_captions
-from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit
-from bowdenfit.results.store import save
+from bowdenfit.results.folder import DETAILS_TEXT, FIGURE_DATA, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit
+from bowdenfit.results.store import save, save_figure_data
 from bowdenfit.stages import announce_stage
 from bowdenfit.words import few, listed, printable
 
 
+class _Attempts(dict[str, Exception]):
+    """Steps that failed, by what each was to write; the others go on."""
+
+    def attempt(self, name: str, step: Callable[..., Any], *arguments: Any) -> None:
+        """Take a step, and note its error."""
+        try:
+            step(*arguments)
+        except Exception as error:
+            self[name] = error
+
+
 @jax.enable_x64(True)
-def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write all files of the results folder; fit.json comes last of the fit's own, before figures and texts.
+def save_results(fit: Fit, folder: Path) -> tuple[str, ...]:
+    """Write the fit itself, with fit.json last, and its texts: a folder that every command reads, without figures and report.
+
+    Args:
+        fit: The fit.
+        folder: Its results folder.
+
+    Returns:
+        What is missing, in sentences; a fit whose texts fail is kept all the same.
+
+    Raises:
+        StoreError: The fit itself, or for want of room what belongs to it, could not be written.
+    """
+    if fit.sampled is None:
+        remove_earlier_fit(folder)
+    failed = _Attempts()
+    announce_stage("working out the answers")
+    save(fit, fit.summary(), folder, True, collect_answers(fit))
+    failed.attempt(SUMMARY_TEXT, lambda: write_text(folder / SUMMARY_TEXT, printable(summary_text(fit))))
+    failed.attempt(DETAILS_TEXT, lambda: write_text(folder / DETAILS_TEXT, printable(details_text(fit))))
+    if not failed:
+        failed.attempt(SUMMARY_TEXT, record_texts, folder)
+    return _what_is_missing(folder, failed)
+
+
+@jax.enable_x64(True)
+def draw_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
+    """Draw the figures of a fit into the results folder that holds it, and write its report.
 
     Args:
         fit: The fit.
@@ -36,39 +73,27 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
         figures: Whether to draw them.
 
     Returns:
-        What is missing, in sentences; a fit whose figures or report fail is kept all the same.
+        What is missing, in sentences.
 
     Raises:
-        StoreError: The fit itself, or for want of room what belongs to it, could not be written.
+        StoreError: There is no room for what is missing.
     """
-    if fit.sampled is None:
-        remove_earlier_fit(folder)
-    failed: dict[str, Exception] = {}
-
-    def attempt(name: str, step: Callable[..., Any], *arguments: Any) -> None:
-        try:
-            step(*arguments)
-        except Exception as error:
-            failed[name] = error
-
-    announce_stage("working out the answers")
-    data = _figure_data(fit, failed) if figures else {}
-    save(fit, fit.summary(), folder, True, collect_answers(fit), data)
-    attempt(SUMMARY_TEXT, lambda: write_text(folder / SUMMARY_TEXT, printable(summary_text(fit))))
-    attempt(DETAILS_TEXT, lambda: write_text(folder / DETAILS_TEXT, printable(details_text(fit))))
-    if not failed.keys() & {SUMMARY_TEXT, DETAILS_TEXT}:
-        attempt(SUMMARY_TEXT, record_texts, folder)
+    failed, data = _Attempts(), dict[str, Any]()
+    if figures:
+        announce_stage("working out what figures show")
+        data = _figure_data(fit, failed)
+        failed.attempt(FIGURE_DATA, save_figure_data, data, folder)
     mark = warning_mark(assess_fit(fit).troubles)
     for name, shown in data.items():
         announce_stage(f"drawing {name}")
-        attempt(name, write_figure_files, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
+        failed.attempt(name, write_figure_files, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
     announce_stage("writing the report")
     drawn_figures = {name: shown for name, shown in data.items() if name not in failed}
     report = partial(report_page, fit, data)
-    attempt(REPORT, lambda: write_page(report(), folder / FIGURES, folder / REPORT))
+    failed.attempt(REPORT, lambda: write_page(report(), folder / FIGURES, folder / REPORT))
     if data:
         captions, is_complete = titles_and_captions(drawn_figures, fit.name, mark), len(drawn_figures) == len(data)
-        attempt("captions", _write_captions, folder, captions, is_complete)
+        failed.attempt("captions", _write_captions, folder, captions, is_complete)
     return _what_is_missing(folder, failed)
 
 
@@ -96,10 +121,12 @@ def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, .
         DiskError: The same, where it is for want of room.
     """
     texts = [name for name in (SUMMARY_TEXT, DETAILS_TEXT) if name in failed]
-    figures = [name for name in failed if name not in {REPORT, *texts}]
+    data = [FIGURE_DATA] if FIGURE_DATA in failed else []
+    figures = [name for name in failed if name not in {REPORT, *texts, *data}]
     some = f"its figures {few(figures)}" if len(figures) > 1 else f"its figure {few(figures)}"
     parts = (
         (figures, some, "drawn", f"draw them later with bowdenfit plot {folder}"),
+        (data, "what its figures show", "kept", "it is worked out again where they are drawn"),
         (texts, listed(texts), "written", f"bowdenfit summary {folder} prints it"),
         ([REPORT] if REPORT in failed else [], "its report", "written", f"write it later with bowdenfit report {folder}"),
     )

@@ -8,9 +8,11 @@ import threading
 import time
 
 import pytest
+from conftest import QUICK
 
 from bowdenfit.cli import running
 from bowdenfit.cli.running import refuse_interrupted, run_interruptibly
+from bowdenfit.verb import NOT_TRUSTED
 
 pytestmark = pytest.mark.extended
 
@@ -203,6 +205,33 @@ def test_an_interrupt_while_something_is_written_leaves_nothing_unfinished(tmp_p
     assert (done.returncode, done.stderr) == (130, "Interrupted.\n")
     assert sorted(tmp_path.iterdir()) == contents
     assert target.read_text() == "of somebody"
+
+
+FIT = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["bowdenfit", "fit", *sys.argv[1:]]
+from bowdenfit.__main__ import start
+start()
+"""
+
+
+def test_an_interrupt_while_figures_are_drawn_leaves_a_whole_fit_whose_answer_is_printed(on_body, tmp_path, run):
+    folder = tmp_path / "fit"
+    quick = [part for setting in QUICK for part in ("--set", setting)]
+    command = [sys.executable, "-c", FIT, str(on_body), *quick, "--seed", "1", "--output", str(folder), "--verbose"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert any("drawing" in line for line in process.stderr)
+        assert (folder / "fit.json").exists() and not (folder / "report.html").exists()
+        process.send_signal(signal.SIGINT)
+        printed, noted = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert noted.splitlines()[-1].startswith(f"Interrupted; {folder} holds the whole fit: ")
+    assert printed == (folder / "summary.txt").read_text()
+    for verb in ("summary", "identify", "length", "predict", "plot", "report"):
+        code, _, error = run(verb, folder, *(["470mm"] if verb == "predict" else []))
+        assert code in (0, NOT_TRUSTED), (verb, error)
+    assert (folder / "report.html").exists() and list((folder / "figures").glob("*.png"))
 
 
 def test_once_what_is_unfinished_was_removed_no_thread_begins_another_file(tmp_path):

@@ -54,12 +54,11 @@ def main() -> None:
     LOGGER.setLevel(logging.INFO)
     LOGGER.propagate = False
     try:
-        trusted = _fit(request, announcer)
+        _fit(request, announcer)
     except Exception as error:
         known = error if isinstance(error, BowdenfitError) else system_error(error)
         announcer.send(refused=str(known or describe_unforeseen(error)))
         sys.exit(known.exit_code if known else 1)
-    announcer.send(trusted=trusted)
 
 
 def _end_with_reader() -> None:
@@ -70,8 +69,8 @@ def _end_with_reader() -> None:
     os._exit(_INTERRUPTED)
 
 
-def _fit(request: dict[str, Any], announcer: Announcer) -> bool:
-    """Fit, and return whether the answer may be trusted."""
+def _fit(request: dict[str, Any], announcer: Announcer) -> None:
+    """Fit, and send whether the answer may be trusted as soon as it is known."""
 
     class AnnouncedBar(tqdm):
         monitor_interval = 0
@@ -80,5 +79,9 @@ def _fit(request: dict[str, Any], announcer: Announcer) -> bool:
             announcer.send(progress=str(self) if msg is None else msg)
 
     with AnnouncedBar(file=io.StringIO(), **WATCH.bar) as bar:
-        fit = bf.fit(**request, progress=partial(WATCH.show, bar), report=lambda sentence: announcer.send(note=sentence))
-    return fit.verdict().trusted
+        bf.fit(
+            **request,
+            progress=partial(WATCH.show, bar),
+            report=lambda sentence: announcer.send(note=sentence),
+            answered=lambda fit: announcer.send(trusted=fit.verdict().trusted),
+        )

@@ -38,6 +38,7 @@ class FitPage:
     def __init__(self, workbench: Workbench, name: str) -> None:
         self._workbench, self._name = workbench, name
         self._running: tuple[tuple[ui.html, ui.html, ui.html], FitJob] | None = None
+        self._answered = False  # whether the answer of the fit that runs is shown
         with frame(name):
             self._place = block("div")
             with self._place:
@@ -50,8 +51,10 @@ class FitPage:
         self._place.clear()
         self._running, job = None, self._workbench.jobs.get(self._name)
         with self._place:
-            if job is not None and (job.running or job.refusal or job.cancelled):
+            if job is not None and (job.running or (job.trusted is None and (job.refusal or job.cancelled))):
                 self._show_job(job)
+                if job.trusted is not None:
+                    await self._show_printed()
             elif (self._workbench.results(self._name) / FIT_FILE).is_file():
                 await _show_answer(self._workbench, self._name)
             else:
@@ -62,12 +65,18 @@ class FitPage:
         if self._running is None:
             return
         elements, job = self._running
-        if not job.running:
+        if not job.running or self._answered != (job.trusted is not None):
             await self.show()
             return
         stage = "" if job.progress.startswith(job.stage) else job.stage  # which says the same and more
         for element, words in zip(elements, (stage, job.progress, _clock(job.seconds)), strict=True):
             element.set_content(escape(words))
+
+    async def _show_printed(self) -> None:
+        """Show the answer of a fit whose figures are still drawn."""
+        printed = await self._workbench.compute(_read_summary, self._workbench.results(self._name))
+        with section("The answer", "answer"):
+            markup(as_html(printed.text), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
 
     def _show_job(self, job: FitJob) -> None:
         """Show a fit that runs, or why it ended without an answer."""
@@ -86,7 +95,7 @@ class FitPage:
             with block("div", "row"):
                 button("Cancel", lambda: self._workbench.compute(job.cancel))
             text("It goes on if this page is closed; what is sampled is kept.", classes="hint")
-        self._running = (stage, progress, clock), job
+        self._running, self._answered = ((stage, progress, clock), job), job.trusted is not None
 
     def _show_interrupted(self) -> None:
         """Show how an interrupted fit goes on."""

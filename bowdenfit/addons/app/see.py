@@ -175,7 +175,9 @@ def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str)
 def _kind_of(printed: Reply) -> str:
     """Return how the verdict is colored."""
     verdict = printed.page()["verdict"] if printed.page else {}
-    return "bad" if not verdict.get("trusted") else "doubtful" if verdict.get("doubts") else "good"
+    if not verdict.get("trusted"):
+        return "bad"
+    return "doubtful" if verdict.get("doubts") or not verdict.get("usable") else "good"
 
 
 def _read_summary(folder: Path) -> Reply:

@@ -46,7 +46,7 @@ def answer_section(fit: Record) -> PageSection:
         choices = (PageTable(best.heads, tuple(best.rows), "Lengths that can be bought"),) if best.choices else ()
     context = {
         "trusted": fit_verdict.trusted,
-        "doubtful": bool(fit_verdict.doubts) or not fit_verdict.sampled,
+        "doubtful": bool(fit_verdict.doubts) or not (fit_verdict.sampled and fit_verdict.may_be_used_for("design")),
         "first": first,
         "others": others,
         "warning": distrust_warning(fit_verdict),

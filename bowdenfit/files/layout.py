@@ -1,7 +1,7 @@
 """Where the headings and the data of a sheet are, for tables and recordings alike.
 
-`find_headings` finds the row of headings, by the numbers below it, with the groups
-over it and the units under it; `find_layout` says for a recording what its columns hold and where they begin.
+`find_headings` finds the row of headings, by the numbers below it, with the groups over it and the units under it;
+`find_layout` says for a recording what its columns hold and where they begin.
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,6 @@ class Headings:
         header: Of these the one that names the columns.
         names: Heading of each column, behind that of its group.
         units: The unit below each name; empty without one.
-
     """
 
     rows: tuple[CsvRecord, ...]

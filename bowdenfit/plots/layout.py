@@ -1,4 +1,8 @@
-"""Pages of panels: matplotlib places these (constrained layout), and what stands above all panels has room added for it."""
+"""Where panels, labels, tick numbers and legends go, in inches.
+
+matplotlib's constrained layout would give the same positions, but draws every label twice more to do so, which is a
+quarter of the time of a figure. Tests check that nothing overlaps or leaves the page.
+"""
 
 from __future__ import annotations
 
@@ -17,50 +21,91 @@ from bowdenfit.plots.style import LEAST, SMALL, TITLE_SIZE, VERMILLION, WIDE
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.figure import Figure
 
-    from bowdenfit.plots.page import Page as Figure
-
-# Sizes are in inches, and judgements: `tests/support/figure_words.py` looks for words on top of each other in every figure.
-LEFT, RIGHT, BOTTOM = 0.62, 0.18, 0.45  # margins, by which the height of a page and how many panels it has are chosen
+# Sizes of pages are in inches, and judgements: as small as they can be without words on top of each other, which
+# `tests/support/figure_words.py` looks for in every figure.
+LEFT, RIGHT, BOTTOM = 0.62, 0.18, 0.45  # margins
 LEGEND_ROW, LEGEND_ROOM = 0.155, 0.12  # a row of the legend, and what is around all of them
 TITLE = 0.22  # room for a title of one line
+LABEL_LEFT, LABEL_BELOW = 0.41, 0.25  # from the axes to its labels
 EDGE = 0.08  # from words to the edge of the page
 _MARK, _APART = 2.6, 2.0  # of a legend, in its font size: a mark with its gap, and from one column to the next
 _LOWEST = 0.6  # of the height that suits a panel, that it may have; a judgement
-_TITLE_ROWS, _TITLE_ROW, _LABEL_ROW = 2, 0.15, 0.13  # most rows of a title, and one more row of a title or label
+_TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13  # most rows of a title, and one more row of a title or label
 
 
 def empty_page(width: float, height: float) -> Figure:
     """Return an empty figure; sizes in inches."""
-    return plots.page.Page(width, height)
+    return plots.page.Page(figsize=(width, height))
 
 
 def panels(
-    heights: Sequence[float], columns: int, top: float, gaps: tuple[float, float], page: float = WIDE,
-    widths: Sequence[float] | None = None, **sharing: object,
-) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    heights: Sequence[float], columns: int, top: float, gaps: tuple[float, float], page: float = WIDE, **sharing: object
+) -> tuple[Figure, list[Axes]]:
     """Return a figure with a grid of panels, and the panels row by row.
 
     Args:
-        heights: Heights of each row of panels, about.
+        heights: Heights of each row of panels.
         columns: Panels in a row.
         top: Room above the panels, for their titles.
-        gaps: Between panels, across and down, about.
+        gaps: Between panels, across and down.
         page: Width of the figure.
-        widths: Ratios of the widths of the columns; all are equally wide if omitted.
         sharing: `sharex` and `sharey`, as for `Figure.subplots`.
     """
-    figure = empty_page(page, top + sum(heights) + gaps[1] * (len(heights) - 1) + BOTTOM)
-    figure.panel_height = sum(heights)
-    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights, width_ratios=widths)
+    across, down = gaps
+    height = top + sum(heights) + down * (len(heights) - 1) + BOTTOM
+    width = (page - LEFT - RIGHT - across * (columns - 1)) / columns
+    figure = empty_page(page, height)
+    grid = figure.add_gridspec(
+        len(heights), columns, height_ratios=heights, left=LEFT / page, right=1 - RIGHT / page,
+        bottom=BOTTOM / height, top=1 - top / height, wspace=across / width, hspace=down * len(heights) / sum(heights),
+    )  # fmt: skip
     made = list(grid.subplots(**sharing, squeeze=False).flat)  # type: ignore[call-overload]
-    return figure, [substitute(axes) for axes in made]
+    flat = [substitute(axes) for axes in made]
+    for axes in flat:
+        place_labels(figure, axes)
+    return figure, flat
 
 
-def add_panel(figure: Figure, cell: SubplotSpec, sharex: Sequence[Axes] = (), sharey: Sequence[Axes] = ()) -> Axes:
-    """Add a panel in a cell of a grid, which shares axes with the first of others, if there are any."""
-    return substitute(figure.add_subplot(cell, sharex=next(iter(sharex), None), sharey=next(iter(sharey), None)))
+def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float, **sharing: Any) -> Axes:
+    """Add a panel at a position in inches."""
+    page, total = figure.get_size_inches()
+    return substitute(figure.add_axes((left / page, bottom / total, width / page, height / total), **sharing))
+
+
+def place_labels(figure: Figure, axes: Axes, left: float = LABEL_LEFT, below: float = LABEL_BELOW) -> None:
+    """Put the axis labels at fixed distances [in], so that those of neighbors line up."""
+    if is_borrowed(axes):
+        return
+    inches = figure.dpi_scale_trans
+    axes.yaxis.set_label_coords(0.0, 0.5, axes.transAxes + plots.mpl.ScaledTranslation(-left, 0.0, inches))
+    axes.xaxis.set_label_coords(0.5, 0.0, axes.transAxes + plots.mpl.ScaledTranslation(0.0, -below, inches))
+
+
+def number_width(axes: Axes) -> float:
+    """Return the width of the widest tick number left of a panel [in]; 0 if none is shown."""
+    low, high = sorted(axes.get_ylim())
+    axis = axes.yaxis
+    if not axis.get_tick_params()["labelleft"]:
+        return 0.0
+    positions = [float(position) for position in axis.get_majorticklocs()]
+    texts = axis.get_major_formatter().format_ticks(positions)
+    return max((text_width(t) for t, at in zip(texts, positions, strict=True) if t and low <= at <= high), default=0.0)
+
+
+def squeeze(figure: Figure, left: float, to: float) -> None:
+    """Make the left margin wider, at the cost of the panels.
+
+    Args:
+        figure: The page.
+        left, to: The margin as it is and as it shall be [in].
+    """
+    page = figure.get_size_inches()[0]
+    share = (page - RIGHT - to) / (page - RIGHT - left)
+    for axes in figure.axes:
+        box = axes.get_position()
+        axes.set_position(((to + (box.x0 * page - left) * share) / page, box.y0, box.width * share, box.height))
 
 
 def drop_unused(flat: list[Axes], used: int) -> list[Axes]:
@@ -130,16 +175,16 @@ def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:
     for panel in axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             entries.setdefault(wrap_words(label, room - _MARK * SMALL / 72), handle)
-    lines = max((panel.get_xlabel().count("\n") for panel in figure.axes), default=0)
-    figure.set_height(figure.get_size_inches()[1] + _LABEL_ROW * lines)
-    figure.align_labels()
     if not entries:
         return
     widths = [_MARK * SMALL / 72 + text_width(label) for label in entries]
     columns = next(n for n in range(min(columns, len(entries)), 0, -1) if n == 1 or _legend_width(widths, n) <= room)
     rows = max(sum(1 + label.count("\n") for label in part) for part in np.array_split(np.array(list(entries)), columns))
-    legend = figure.legend(list(entries.values()), list(entries), loc="upper center", ncols=columns, borderaxespad=0.3)
-    figure.add_above(legend, LEGEND_ROOM + LEGEND_ROW * rows)
+    _add_room(figure, LEGEND_ROOM + LEGEND_ROW * rows)
+    figure.legend(
+        list(entries.values()), list(entries), loc="upper center", ncols=columns, borderaxespad=0.3,
+        bbox_to_anchor=(0.5, 1.0),
+    )  # fmt: skip
 
 
 def _legend_width(widths: Sequence[float], columns: int) -> float:
@@ -160,16 +205,25 @@ def title_above(figure: Figure, words: str, mark: str = "", height: float | None
         UsageError: Panels would be too low to be read.
     """
     width = figure.get_size_inches()[0]
-    lines = wrap_words(mark, width - 2 * EDGE, TITLE_SIZE, "bold") if mark else ""
     title = wrap_words(words, width - 2 * EDGE, TITLE_SIZE, "bold", _TITLE_ROWS)
-    for text, color in ((lines, VERMILLION), (title, "black")):
-        if text:
-            look: dict[str, Any] = {"fontsize": TITLE_SIZE, "fontweight": "bold", "color": color, "parse_math": False}
-            artist = figure.text(EDGE / width, 1.0, text, ha="left", va="top", **look)
-            figure.add_above(artist, _TITLE_ROW * (1 + text.count("\n")))
-    figure.add_above(None, EDGE)
+    marked = wrap_words(mark, width - 2 * EDGE, TITLE_SIZE, "bold").split("\n") if mark else []
+    above = EDGE + _TITLE_ROW * (1 + title.count("\n"))
+    room = above + _TITLE_ROW * len(marked)
     if height is not None:
-        _stretch_panels(figure, height)
+        _stretch_panels(figure, height, room)
+    _add_room(figure, room)
+    height = figure.get_size_inches()[1]
+    for legend in figure.legends:
+        legend.set_bbox_to_anchor((0.5, 1 - room / height), figure.transFigure)
+    figure.text(
+        EDGE / width, 1 - EDGE / height, title, ha="left", va="top", fontsize=TITLE_SIZE, fontweight="bold",
+        parse_math=False,
+    )  # fmt: skip
+    for row, line in enumerate(marked):
+        figure.text(
+            EDGE / width, 1 - (above + _TITLE_ROW * row) / height, line, ha="left", va="top", fontsize=TITLE_SIZE,
+            fontweight="bold", color=VERMILLION, parse_math=False,
+        )  # fmt: skip
 
 
 def add_mark(axes: Axes, words: str) -> None:
@@ -191,31 +245,59 @@ def label_across(axes: Axes, words: str) -> None:
     if is_borrowed(axes):
         axes.set_xlabel(words)
         return
-    page, box = axes.figure.get_size_inches()[0], axes.get_position()  # type: ignore[union-attr]
+    figure = axes.figure
+    assert figure is not None  # a panel is on a page
+    page, box = figure.get_size_inches()[0], axes.get_position()  # type: ignore[union-attr]
     axes.set_xlabel(wrap_words(words, page * min(box.width + 0.16 / page, 2 * (1 - box.x0 - box.width / 2)), 8))
 
 
-def number_outer(axes: Axes) -> None:
-    """Show the numbers of a panel below which there is none; they need no room between rows of panels."""
-    axes.tick_params(labelbottom=True)
-    cell = axes.get_subplotspec()
-    axes.xaxis.set_in_layout(cell is None or cell.is_last_row())
+def room_for_labels(figure: Figure) -> None:
+    """Make the page higher at the bottom where the names of lower axes take several lines."""
+    lines = max((axes.get_xlabel().count("\n") for axes in figure.axes), default=0)
+    if lines:
+        _add_room(figure, 0.0, LABEL_ROW * lines)
 
 
-def _stretch_panels(figure: Figure, height: float) -> None:
-    """Make panels higher or lower so that a page is as high as stated [in].
+def _add_room(figure: Figure, above: float, below: float = 0.0) -> None:
+    """Make the page higher, and leave everything else where it is."""
+    width, height = figure.get_size_inches()
+    boxes = [axes.get_position() for axes in figure.axes]
+    taller = height + above + below
+    figure.set_size_inches(width, taller)
+    for axes, box in zip(figure.axes, boxes, strict=True):
+        axes.set_position((box.x0, (box.y0 * height + below) / taller, box.width, box.height * height / taller))
+
+
+def _stretch_panels(figure: Figure, height: float, above: float) -> None:
+    """Make panels higher or lower so that a page is as high as stated; what is between them stays.
+
+    Args:
+        figure: The page.
+        height: Height of the page [in], with what is added above it.
+        above: Height added above it [in].
 
     Raises:
         UsageError: Panels would be too low to be read.
     """
-    width, natural = figure.get_size_inches()
-    least = natural - (1 - _LOWEST) * figure.panel_height
-    if height < least:
+    width, before = figure.get_size_inches()
+    boxes = [axes.get_position() for axes in figure.axes]
+    edges = np.unique(np.round([0.0, before, *(before * y for box in boxes for y in (box.y0, box.y1))], 6))
+    middles, rows = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    has_panel = np.array([any(before * box.y0 < y < before * box.y1 for box in boxes) for y in middles])
+    between, of_panels = float(rows[~has_panel].sum()), float(rows[has_panel].sum())
+    stretch = (height - above - between) / of_panels
+    if stretch < _LOWEST:
+        least = math.ceil(10 * (above + between + _LOWEST * of_panels)) / 10
         raise UsageError(
             f"this figure does not fit into {height:g} in of height at {width:g} in of width; write "
-            f"figsize=({width:g}, {math.ceil(10 * least) / 10:g}), or more, or leave figsize out for the size that suits it."
+            f"figsize=({width:g}, {least:g}), or more, or leave figsize out for the size that suits it."
         )
-    figure.set_height(height)
+    stretched = np.concatenate([[0.0], np.cumsum(np.where(has_panel, stretch * rows, rows))])
+    taller = float(stretched[-1])
+    figure.set_size_inches(width, taller)
+    for axes, box in zip(figure.axes, boxes, strict=True):
+        low, high = np.interp([before * box.y0, before * box.y1], edges, stretched)
+        axes.set_position((box.x0, low / taller, box.width, (high - low) / taller))
 
 
 TICK = 0.035  # in, length of a tick: less than matplotlib's 3.5 pt; a judgement

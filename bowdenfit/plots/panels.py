@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit import plots
+from bowdenfit.plots.borrowed import is_borrowed
 from bowdenfit.plots.layout import (
     LEFT,
     RIGHT,
@@ -15,14 +16,15 @@ from bowdenfit.plots.layout import (
     count_columns,
     drop_unused,
     label_across,
-    number_outer,
     panels,
+    room_for_labels,
     text_width,
 )
 from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
-    from bowdenfit.plots.layout import Axes, Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOST = 8  # recordings in a figure; a judgement
 LEAST_WIDTH = 1.2  # in, of a panel; a judgement: three numbers have room below it
@@ -136,7 +138,9 @@ def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> N
             axes.set_ylabel(y_label)
         if i + columns >= len(flat):
             label_across(axes, x_label)
-            number_outer(axes)
+            axes.tick_params(labelbottom=True)
+    if not is_borrowed(flat[0]):
+        room_for_labels(flat[0].figure)  # type: ignore[arg-type]
 
 
 def enlarge_marks(figure: Figure) -> None:

@@ -8,16 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.borrowed import is_borrowed
 from bowdenfit.plots.layout import (
     BOTTOM,
-    LEFT,
     RIGHT,
     TITLE,
-    add_panel,
+    axes_at,
     count_columns,
     empty_page,
     label_across,
-    number_outer,
+    number_width,
+    place_labels,
+    room_for_labels,
+    squeeze,
 )
 from bowdenfit.plots.panels import LEAST_WIDTH, finite, set_limits, share_limits, shorten_title
 from bowdenfit.plots.style import GRAY, MEDIUM, SMALL, WIDE
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 # Sizes are judgements, as those of `layout`.
 STRIP, GAP = 0.5, 0.1  # in, height of a strip, and from it to its panel
+LEFT = 0.68  # in, margin
+_NUMBERS, _PAD, _TWO_LINES = 0.27, 0.11, 0.28  # in, room for numbers, for what is beside them, and for a name in two lines
 NONE = 1e-9  # below which residuals are rounding, in any unit that is shown
 TALL = 0.85  # height over width of a panel
 _ROOM = 1.2  # limits of a strip over its largest residual, so that no mark touches its edge
@@ -62,7 +67,12 @@ class Stripped:
                 name_strip(strip, unit)
             if i + self.columns >= len(self.mains):
                 label_across(strip, x_label)
-                number_outer(strip)
+                strip.tick_params(labelbottom=True)
+        room_for_labels(self.figure)
+        far = max(_NUMBERS, *(number_width(axes) for axes in (*self.mains, *self.strips))) + _PAD
+        squeeze(self.figure, LEFT, max(LEFT, far + _TWO_LINES))
+        for main, strip in zip(self.mains, self.strips, strict=True):
+            place_names(main, strip, far)
 
     def finish_strips(self) -> None:
         """Finish all strips; see the function `finish_strips`."""
@@ -83,6 +93,27 @@ def finish_strips(strips: Sequence[Axes]) -> None:
 def name_strip(strip: Axes, unit: str) -> None:
     """Label a strip with the unit of its residuals, in two lines."""
     strip.set_ylabel(f"Residual\n({unit})", fontsize=SMALL, linespacing=1.0)
+
+
+def place_names(main: Axes, strip: Axes, far: float | None = None) -> None:
+    """Put the names of panel and strip beside their numbers, in line.
+
+    Args:
+        main: The panel.
+        strip: Its strip.
+        far: From the axes to the names [in]; beside the wider numbers of the two, and on the page, if omitted.
+    """
+    if is_borrowed(main):
+        return
+    figure = main.figure
+    assert figure is not None  # a panel is on a page
+    if far is None:
+        far = max(_NUMBERS, number_width(main), number_width(strip)) + _PAD
+        margin = main.get_position().x0 * figure.get_size_inches()[0]  # type: ignore[union-attr]
+        squeeze(figure, margin, max(margin, far + _TWO_LINES))  # type: ignore[arg-type]
+    width = figure.get_size_inches()[0] * main.get_position().width  # type: ignore[union-attr]
+    for axes in (main, strip):
+        axes.yaxis.set_label_coords(-far / width, 0.5)
 
 
 def panels_with_strips(
@@ -115,17 +146,22 @@ def panels_with_strips(
     inner = (page - LEFT - RIGHT - gap * (columns - 1)) / columns
     top = TITLE if any(names) else 0.06
     main, down = height or TALL * inner, top + (0.08 if share_x else 0.2)
-    figure = empty_page(page, top + rows * (main + GAP + STRIP) + (rows - 1) * down + BOTTOM)
-    figure.panel_height = rows * (main + STRIP)
-    grid, made = figure.add_gridspec(2 * rows, columns, height_ratios=(main, STRIP) * rows), Stripped(figure, [], [], columns)
+    row = main + GAP + STRIP
+    figure = empty_page(page, top + rows * row + (rows - 1) * down + BOTTOM)
+    made = Stripped(figure, [], [], columns)
     for i, name in enumerate(names):
-        row, column = divmod(i, columns)
-        made.mains.append(add_panel(figure, grid[2 * row, column], made.mains[:1] * share_x, made.mains[:1] * share_y))
+        left, bottom = LEFT + (i % columns) * (inner + gap), BOTTOM + (rows - 1 - i // columns) * (row + down)
+        first = made.mains[0] if made.mains else None
+        sharing = {"sharex": first if share_x else None, "sharey": first if share_y else None}
+        made.mains.append(axes_at(figure, left, bottom + STRIP + GAP, inner, main, **sharing))
         made.mains[-1].set_title(shorten_title(name, inner), fontsize=SMALL)
-        made.strips.append(add_panel(figure, grid[2 * row + 1, column], made.mains[-1:], made.strips[:1]))
+        sharing = {"sharex": made.mains[-1], "sharey": made.strips[0] if made.strips else None}
+        made.strips.append(axes_at(figure, left, bottom, inner, STRIP, **sharing))
         inside = i % columns > 0
         made.mains[-1].tick_params(labelbottom=False, labelleft=not (share_y and inside))
         made.strips[-1].tick_params(labelbottom=not share_x, labelleft=not inside)
+        place_labels(figure, made.mains[-1])
+        place_labels(figure, made.strips[-1])
     set_limits(made.mains, across, "x", share_x)
     set_limits(made.mains, up, "y", share_y)
     return made

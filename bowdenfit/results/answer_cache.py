@@ -29,7 +29,7 @@ from bowdenfit.results.folder import (
 )
 from bowdenfit.words import filled, printable
 
-SCHEMA = 11  # counted up with every change of what one of the questions answers, and of how figures look
+SCHEMA = 10  # counted up with every change of what one of the questions answers, and of how figures look
 TROUBLES, COEFFICIENT_TROUBLES = "troubles", "troubles of coefficients"  # keys of the answers: see `Verb.needs_coefficients`
 CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once; a judgement

@@ -128,7 +128,6 @@ def test_panels_are_stretched_to_a_page_and_what_is_between_them_stays(fit):
     assert tuple(taller.get_size_inches()) == pytest.approx((7, height + 2))
 
     def between(figure):
-        figure.draw_without_rendering()
         boxes = [axes.get_position() for axes in figure.axes]
         return [(above.y0 - below.y1) * figure.get_size_inches()[1] for above, below in pairwise(boxes)]
 

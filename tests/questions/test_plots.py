@@ -16,13 +16,12 @@ from figure_words import assert_readable, check_words, words
 from fontTools.ttLib import TTFont
 from matplotlib.collections import PolyCollection
 from matplotlib.contour import ContourSet
-from matplotlib.figure import Figure
 from shared_figures import DrawnOnce
 from stored_figure_data import assert_kept
 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.curves import BAND_QUANTILES, NEW_RUN, Band, density
-from bowdenfit.plots.layout import NUMBER_SPACE, number_below, ticks
+from bowdenfit.plots.layout import NUMBER_SPACE, axes_at, empty_page, number_below, ticks
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, write_figure_files
@@ -487,8 +486,7 @@ def test_ticks_are_round_and_within_the_axis(limits):
 
 
 def panel_of(page, left, width, limits):
-    whole, high = page.get_size_inches()
-    axes = page.add_axes((left / whole, 0.5 / high, width / whole, 0.8 / high))
+    axes = axes_at(page, left, 0.5, width, 0.8)
     axes.set(xlim=limits, yticks=[])
     axes.plot(limits, (0, 1))
     number_below(axes)
@@ -496,7 +494,7 @@ def panel_of(page, left, width, limits):
 
 @in_paper_style
 def test_numbers_at_the_edges_of_neighbors_keep_apart():
-    page = Figure(figsize=(3.2, 1.5))
+    page = empty_page(3.2, 1.5)
     for i, shown in enumerate([(0.003, 0.02), (0.0, 0.42)]):
         panel_of(page, 0.5 + 1.085 * i, 1.0, shown)
     check_words(page, "neighbors")
@@ -512,7 +510,7 @@ def test_an_axis_has_two_numbers_which_make_a_scale(width):
         assert len(texts) > 1, (low, span)
         assert [float(text) for text in texts] == pytest.approx(values, abs=1e-9)
         if i % 25 == 0:
-            page = Figure(figsize=(width + 1.0, 1.5))
+            page = empty_page(width + 1.0, 1.5)
             panel_of(page, 0.5, width, (low, low + span))
             check_words(page, f"{low} {span}")
 

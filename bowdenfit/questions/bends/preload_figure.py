@@ -11,7 +11,7 @@ from bowdenfit.plots.captions import describe_curve, describe_strip
 from bowdenfit.plots.curves import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
-from bowdenfit.plots.strips import STRIP, finish_strips, name_strip
+from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
 from bowdenfit.questions import bends as room
 from bowdenfit.words import counted
@@ -73,6 +73,7 @@ def draw(curve: PreloadCurve, width: float | None = None) -> Figure:
     _draw_preload(flat[0], curve)
     if read:
         _draw_residuals(flat[1], curve)
+        place_names(flat[0], flat[1])
     if ever_slack:
         draw_quantiles(flat[-1], curve.wrap_angle, curve.slack, BLUE)
         _start_at_zero(flat[-1], "Slack (mm)", curve.slack)

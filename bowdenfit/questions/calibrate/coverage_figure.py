@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bowdenfit.plots.layout import legend_above, panels, wrap_words
+from bowdenfit.plots.layout import LEFT, legend_above, panels, squeeze, text_width, wrap_words
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, VERMILLION, in_paper_style
 from bowdenfit.words import counted
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 HEADING = "Coverage of the intervals: how often they contain the true value"
 _ROW = 0.24  # in, of a quantity
 _LONGEST = 2.0  # in, of a name
+_MARK = 0.2  # in, from a name to the panel and to the edge of the page
 
 
 def caption(calibration: Calibration) -> str:
@@ -57,4 +58,5 @@ def quantity_panels(calibration: Calibration, columns: int) -> tuple[Figure, lis
     for axes in flat:
         axes.set_ylim(len(names) - 0.4, -0.6)
         axes.set_yticks(range(len(names)), names)
+    squeeze(figure, LEFT, max(LEFT, _MARK + max(map(text_width, names), default=0.0)))
     return figure, flat

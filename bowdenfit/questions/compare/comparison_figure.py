@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, empty_page, legend_above, wrap_words
+from bowdenfit.plots.layout import TITLE, axes_at, empty_page, legend_above, place_labels, wrap_words
 from bowdenfit.plots.panels import shorten_name
 from bowdenfit.plots.style import (
     BLACK,
@@ -32,7 +32,8 @@ MAX_LABELED = 40  # readings that are named below the axis
 MAX_COLUMNS = 4  # panels of parameters side by side
 MIN_LABEL_WIDTH, _APART = 0.3, 0.08  # in, of a name of a table, and to the next
 MAX_NAME_LENGTH = 22  # characters of a fit's name that have room
-_ROW, _BELOW = 0.23, 0.45  # in, of a name, and below a panel
+_CHARACTER, _ROW = 0.062, 0.23  # in, of a name
+_RIGHT, _BELOW = 0.18, 0.45
 _MIDDLE = 1.7  # in, height of the middle panel
 _GAP = 0.62
 
@@ -55,6 +56,7 @@ def draw(comparison: Comparison) -> Figure:
     """Draw differences of the score with standard errors, their contributions by reading, and parameters side by side."""
     cells = _parameter_cells(comparison)
     names = [shorten_name(name, MAX_NAME_LENGTH) for name in comparison.differences]
+    left = max(0.66, 0.2 + _CHARACTER * max(map(len, names)))
     height_of_fits = 0.25 + _ROW * len(names)
     columns = min(MAX_COLUMNS, len(cells)) if cells else 0
     rows = -(-len(cells) // columns) if cells else 0
@@ -62,13 +64,10 @@ def draw(comparison: Comparison) -> Figure:
     parts = [TITLE, height_of_fits, _GAP + TITLE, _MIDDLE, below_readings]
     parts += [TITLE + 0.1, *([height_of_fits, _BELOW + 0.1] * rows)] if rows else []
     figure = empty_page(WIDE, sum(parts))
-    heights = [height_of_fits, _MIDDLE, *[height_of_fits] * rows]
-    grid = figure.add_gridspec(len(heights), max(columns, 1), height_ratios=heights)
-    figure.panel_height = sum(heights)
-    _draw_differences(figure.add_subplot(grid[0, :]), comparison, names)
-    middle = figure.add_subplot(grid[1, :])
+    _draw_differences(axes_at(figure, left, sum(parts[2:]), WIDE - left - _RIGHT, height_of_fits), comparison, names)
+    middle = axes_at(figure, left, below_readings + sum(parts[5:]), WIDE - left - _RIGHT, _MIDDLE)
     _draw_by_reading(middle, comparison, names)
-    flat = [figure.add_subplot(grid[2 + i // columns, i % columns]) for i in range(len(cells))]
+    flat = [_cell_axes(figure, left, parts, i, columns, height_of_fits) for i in range(len(cells))]
     for i, (axes, cell) in enumerate(zip(flat, cells, strict=True)):
         _draw_parameter(axes, cell, names, list(comparison.differences), i % columns == 0)
     if flat:
@@ -87,6 +86,14 @@ def _label_room(comparison: Comparison) -> float:
 
 def _format_plainly(label: str) -> str:
     return label.replace("_", " ")
+
+
+def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns: int, height: float) -> Axes:
+    """Return the panel of a parameter."""
+    width = (WIDE - left - _RIGHT - 0.22 * (columns - 1)) / columns
+    row = i // columns
+    bottom = sum(parts[6 + 2 * row + 1 :])
+    return axes_at(figure, left + (i % columns) * (width + 0.22), bottom, width, height)
 
 
 def _parameter_cells(comparison: Comparison) -> list[tuple[str, dict[str, Interval]]]:
@@ -113,6 +120,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, names: list[str]) -> N
     axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="Score minus that of the best, with one and two standard errors")
     axes.set_title(f"Prediction of {counted(len(comparison.readings), 'reading')} left out", loc="left")
     axes.grid(axis="y", visible=False)
+    place_labels(axes.figure, axes)  # type: ignore[arg-type]
 
 
 def _draw_by_reading(axes: Axes, comparison: Comparison, names: list[str]) -> None:
@@ -134,6 +142,8 @@ def _draw_by_reading(axes: Axes, comparison: Comparison, names: list[str]) -> No
         axes.set_xticks(x, [_format_plainly(label) for _, label in comparison.readings], rotation=90, fontsize=SMALL - 1)
     else:
         axes.set_xlabel("Reading, in the order of the tables")
+    page, box = axes.figure.get_size_inches(), axes.get_position()  # type: ignore[union-attr]
+    axes.yaxis.set_label_coords(-0.45 / (box.width * page[0]), 0.5)
 
 
 def _mark_tables(axes: Axes, comparison: Comparison) -> None:
@@ -166,3 +176,5 @@ def _draw_parameter(
     axes.set_yticks(range(len(fits)), names if named else [])
     axes.locator_params(axis="x", nbins=3)
     axes.grid(axis="y", visible=False)
+    page, box = axes.figure.get_size_inches(), axes.get_position()  # type: ignore[union-attr]
+    axes.xaxis.set_label_coords(0.5, -0.25 / (box.height * page[1]))

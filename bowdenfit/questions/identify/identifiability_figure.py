@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.identify.answer import Identifiability
 
 HEADING = "What the measurements determine"
-_ROW, _TOP, _BOTTOM, _NAMES = 0.24, 0.34, 0.5, 1.75  # in
+_ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
 _PROFILE, _PROFILES_IN_ROW = 1.75, 4  # height of a row of profiles [in], and how many are in it
 _RISE_AT_90, _HIGHEST_RISE = 2.71, 12.0  # rise at the ends of a 90 % interval, and the highest shown
 _TICK_GAP = 0.08  # in, between numbers below a profile
@@ -52,15 +52,19 @@ def draw(identifiability: Identifiability) -> Figure:
     rows = -(-len(profiles) // _PROFILES_IN_ROW)
     total = sum(heights) + rows * _PROFILE
     figure = empty_page(WIDE, total)
-    parts = figure.add_gridspec(1 + bool(profiles), 1, height_ratios=[sum(heights), *[rows * _PROFILE] * bool(profiles)])
-    grid = parts[0].subgridspec(len(groups), 2, height_ratios=[len(group.parameters) for group in groups.values()])
-    for i, (name, group) in enumerate(groups.items()):
-        _draw_shares(figure.add_subplot(grid[i, 0]), name, group)
+    width, top = (WIDE - _NAMES - _GAP - 0.15) / 2, total
+    for (name, group), height in zip(groups.items(), heights, strict=True):
+        bottom, tall = (top - height + _BOTTOM) / total, (height - _TOP - _BOTTOM) / total
+        left = figure.add_axes((_NAMES / WIDE, bottom, width / WIDE, tall))
+        _draw_shares(left, name, group)
         if len(group.parameters) > 1:
-            _draw_combinations(figure.add_subplot(grid[i, 1]), group)
-    below = parts[-1].subgridspec(max(rows, 1), _PROFILES_IN_ROW)
+            _draw_combinations(figure.add_axes(((_NAMES + width + _GAP) / WIDE, bottom, width / WIDE, tall)), group)
+        top -= height
     for i, profile in enumerate(profiles):
-        _draw_profile(figure.add_subplot(below[divmod(i, _PROFILES_IN_ROW)]), profile, i == 0)
+        bottom = top - _PROFILE * (i // _PROFILES_IN_ROW + 1) + _BOTTOM
+        across = (WIDE - 0.5) / _PROFILES_IN_ROW
+        box = (0.6 + across * (i % _PROFILES_IN_ROW), bottom, across - 0.45, _PROFILE - _BOTTOM - _TOP)
+        _draw_profile(figure.add_axes((box[0] / WIDE, box[1] / total, box[2] / WIDE, box[3] / total)), profile, i == 0)
     return figure
 
 

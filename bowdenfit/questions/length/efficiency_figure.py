@@ -10,7 +10,7 @@ import numpy as np
 from bowdenfit.plots.captions import describe_strip
 from bowdenfit.plots.curves import GRID_POINTS, NEW_RUN, Band, density, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import TITLE, legend_above, panels, wrap_words
-from bowdenfit.plots.strips import STRIP, finish_strips, name_strip
+from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -171,6 +171,7 @@ def draw(data: EfficiencyAlongRoute, width: float | None = None) -> Figure:
     _draw_curve_and_points(flat[0], data)
     if has_points:
         _draw_residuals(flat[1], data)
+        place_names(flat[0], flat[1])
     if data.optimum is not None:
         _draw_optimum_density(flat[1 + has_points], data, data.optimum)
         for axes in (flat[0], flat[1 + has_points]):

@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.plots.curves import route_limits, shade_outside
-from bowdenfit.plots.layout import RIGHT, TITLE, legend_above, panels, text_width, wrap_words
+from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels, text_width, wrap_words
 from bowdenfit.plots.panels import show_plain_numbers
 from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, axis_label, in_paper_style
 from bowdenfit.questions.next.words import TITLE as NEXT_TITLE
@@ -110,7 +110,10 @@ def _draw_rows(ranking: NextMeasurement) -> Figure:
     """Draw a row for each of the best candidates."""
     best = ranking.ranked[:MAX_ROWS]
     names = [wrap_words(r.words, LABEL_WIDTH, most=1) for r in best]
+    room = max(LEFT, 0.15 + max(map(text_width, names)))
     figure, (axes,) = panels([max(1.0, ROW_HEIGHT * (len(best) + 1))], 1, TITLE, (0, 0), WIDTH)
+    box = axes.get_position()
+    axes.set_position((room / WIDTH, box.y0, box.x1 - room / WIDTH, box.height))
     rows = np.arange(len(best))
     axes.errorbar(
         [r.sd for r in best], rows, xerr=[2 * r.sd_error for r in best], fmt="o", color=SERIES_COLORS[0], capsize=2,
@@ -123,8 +126,7 @@ def _draw_rows(ranking: NextMeasurement) -> Figure:
     show_plain_numbers(axes, "x")
     axes.locator_params(axis="x", nbins=4)
     axes.set_xlabel(_axis_label(ranking))
-    named = max(map(text_width, names))
-    _set_title(axes, ranking, -0.9 * named / (WIDTH - RIGHT - named))
+    _set_title(axes, ranking, -0.9 * room / (WIDTH * axes.get_position().width))
     axes.grid(visible=False, axis="y")
     legend_above(figure, [axes], columns=2)
     return figure

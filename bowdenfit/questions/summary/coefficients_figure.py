@@ -18,6 +18,7 @@ from bowdenfit.plots.layout import (
     label_across,
     legend_above,
     panels,
+    room_for_labels,
 )
 from bowdenfit.plots.style import (
     BLACK,
@@ -108,6 +109,7 @@ def draw(parameters: tuple[Coefficient, ...], width: float | None = None) -> Fig
     for axes, parameter in zip(flat, parameters, strict=True):
         _draw_panel(axes, parameter)
     legend_above(figure, flat, columns=3)
+    room_for_labels(figure)
     return figure
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.curves import draw_quantiles, middle, name_band
-from bowdenfit.plots.layout import BOTTOM, RIGHT, add_panel, empty_page, legend_above, wrap_words
+from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrap_words
 from bowdenfit.plots.panels import make_logarithmic
 from bowdenfit.plots.style import (
     BLACK,
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Forces at both ends of the cable"
-MAIN, STRIP, GAP, LEFT = 2.3, 0.85, 0.12, 0.78  # in
+MAIN, STRIP, GAP, ACROSS, LEFT = 2.3, 0.85, 0.12, 0.88, 0.78  # in
+LABEL = 0.56  # in, from the axes to their names: numbers of many digits stand between
 VERDICT_ROW, VERDICT_ROWS = 0.14, 3  # in, and how many at most
 LEAST_WIDTH = 2.6  # in, of a panel with its labels
 NO_FRICTION = (0, (6, 1.5, 1, 1.5))
@@ -141,7 +142,7 @@ def caption(forces: ForcesData) -> str:
 def draw(forces: ForcesData, width: float | None = None) -> Figure:
     """Draw output against input force with residuals below, and the apparent coefficient against the load beside them."""
     page = width or WIDE
-    verdict_lines = wrap_words(_describe_verdict(forces), page - LEFT - RIGHT, most=VERDICT_ROWS)
+    verdict_lines = wrap_words(_describe_verdict(forces), page - LEFT - RIGHT + LABEL, most=VERDICT_ROWS)
     figure, (main, strip, beside) = _make_panels(page, 0.06 + VERDICT_ROW * (1 + verdict_lines.count("\n")))
     if forces.logarithmic:
         for axes, name, value in ((main, "x", "input_force"), (main, "y", "output_force"), (beside, "x", "input_force")):
@@ -150,8 +151,12 @@ def draw(forces: ForcesData, width: float | None = None) -> Figure:
     _draw_forces(main, forces)
     _draw_residuals(strip, forces)
     draw_apparent_friction(beside, forces)
+    inner = page * main.get_position().width
+    for axes in (main, strip, beside):
+        place_labels(figure, axes)
+        axes.yaxis.set_label_coords(-LABEL / inner, 0.5)
     color = GREEN if forces.trusted else VERMILLION
-    main.set_title(verdict_lines, loc="left", color=color, fontsize=SMALL)
+    main.set_title(verdict_lines, loc="left", color=color, fontsize=SMALL, x=-LABEL / inner)
     legend_above(figure, [main, strip, beside], columns=4)
     return figure
 
@@ -159,17 +164,13 @@ def draw(forces: ForcesData, width: float | None = None) -> Figure:
 def _make_panels(page: float, top: float) -> tuple[Figure, list[Axes]]:
     """Return the figure with panels for the output, its residuals, and the coefficient beside or below."""
     beside = page >= 2 * LEAST_WIDTH
-    figure = empty_page(page, top + MAIN + GAP + STRIP + BOTTOM + (0.0 if beside else MAIN + BOTTOM + 2 * GAP))
-    if beside:
-        grid = figure.add_gridspec(2, 2, height_ratios=(MAIN, STRIP))
-        spans = [grid[0, 0], grid[1, 0], grid[:, 1]]
-    else:
-        grid = figure.add_gridspec(3, 1, height_ratios=(MAIN, STRIP, MAIN))
-        spans = [grid[row, 0] for row in range(3)]
-    main = add_panel(figure, spans[0])
-    made = [main, add_panel(figure, spans[1], [main]), add_panel(figure, spans[2])]
-    figure.panel_height = MAIN + STRIP + (0.0 if beside else MAIN)
-    return figure, made
+    inner = (page - LEFT - RIGHT - ACROSS) / 2 if beside else page - LEFT - RIGHT
+    lower = 0.0 if beside else MAIN + BOTTOM + 2 * GAP
+    figure = empty_page(page, top + MAIN + GAP + STRIP + BOTTOM + lower)
+    main = axes_at(figure, LEFT, lower + BOTTOM + STRIP + GAP, inner, MAIN)
+    strip = axes_at(figure, LEFT, lower + BOTTOM, inner, STRIP, sharex=main)
+    left, tall = (LEFT + inner + ACROSS, MAIN + GAP + STRIP) if beside else (LEFT, MAIN)
+    return figure, [main, strip, axes_at(figure, left, BOTTOM, inner, tall)]
 
 
 def _describe_verdict(forces: ForcesData) -> str:

@@ -13,12 +13,13 @@ from bowdenfit.plots.captions import explain_symbols
 from bowdenfit.plots.curves import density, limits
 from bowdenfit.plots.layout import (
     EDGE,
-    add_panel,
     area_entry,
+    axes_at,
     empty_page,
     line_entry,
     number_below,
     number_left,
+    place_labels,
     text_width,
     ticks_below,
     ticks_left,
@@ -120,10 +121,11 @@ def draw(data: Pairs, width: float | None = None) -> Figure:
     upright = _height_of_upright_numbers(quantities, size - GAP)
     bottom = BOTTOM + max(0.0, upright - UPRIGHT)
     figure = empty_page(left + GAP + size * n, bottom + GAP + size * n)
-    grid, panels = figure.add_gridspec(n, n), {}
-    figure.panel_height = size * n
+    panels = {}
     for row, column in np.argwhere(np.tri(n)).tolist():
-        axes = panels[row, column] = add_panel(figure, grid[row, column])
+        axes = panels[row, column] = axes_at(
+            figure, left + size * column, bottom + size * (n - 1 - row), size - GAP, size - GAP
+        )
         axes.set_xlim(quantities[column].limits(SHARE))
         axes.grid(visible=False)
         axes.xaxis.set_visible(row == n - 1)
@@ -135,13 +137,7 @@ def draw(data: Pairs, width: float | None = None) -> Figure:
             _draw_credible_regions(axes, quantities[column], quantities[row])
     for i, quantity in enumerate(quantities):
         label = wrap_words(quantity.label, size - 0.2 * GAP, most=2)
-        _label_axes(panels[n - 1, i], panels[i, 0] if i else None, label)
-    figure.place_panels()
-    for i in range(n):
-        number_below(panels[n - 1, i], upright=upright > 0)
-        if i:
-            number_left(panels[i, 0])
-    figure.align_labels()
+        _label_axes(figure, panels[n - 1, i], panels[i, 0] if i else None, label, left - 0.16, upright)
     _draw_legend(panels[0, 0], _remarks(data, n), figure.get_size_inches()[0] - left - size - GAP - MARK - EDGE)
     return figure
 
@@ -200,11 +196,25 @@ def _draw_credible_regions(axes: Axes, across: SampledQuantity, up: SampledQuant
     )
 
 
-def _label_axes(below: Axes, left: Axes | None, label: str) -> None:
-    """Write a name below a column of panels, and left of a row; None on the first row."""
-    below.set_xlabel(label, fontsize=SMALL)
+def _label_axes(figure: Figure, below: Axes, left: Axes | None, label: str, apart: float, upright: float) -> None:
+    """Write numbers and a name below a column of panels, and left of a row.
+
+    Args:
+        figure: The page.
+        below: The lowest panel of the column.
+        left: The first panel of the row; None on the first row.
+        label: The name.
+        apart: From the axis to a name on its left [in].
+        upright: Height of the numbers below, where they stand upright, else 0 [in].
+    """
+    under = 0.2 + max(0.0, upright - UPRIGHT)
+    number_below(below, upright=upright > 0)
+    below.set_xlabel(label, fontsize=SMALL, va="top")
     if left:
-        left.set_ylabel(label, fontsize=SMALL)
+        number_left(left)
+        left.set_ylabel(label, fontsize=SMALL, va="center")
+        place_labels(figure, left, apart, under)
+    place_labels(figure, below, apart, under)
 
 
 def _remarks(data: Pairs, shown: int) -> list[str]:
@@ -221,8 +231,7 @@ def _draw_legend(first: Axes, remarks: list[str], room: float) -> None:
     """Write the key into the empty corner right of the first panel."""
     entries = [area_entry(f"{100 * share:.0f} % probability", color) for share, color in FILLS.items()]
     entries += [line_entry(wrap_words(remark, room)) for remark in remarks]
-    legend = first.legend(handles=entries, loc="upper left", bbox_to_anchor=(1.1, 1.0), borderaxespad=0, labelspacing=0.25)
-    legend.set_in_layout(False)
+    first.legend(handles=entries, loc="upper left", bbox_to_anchor=(1.1, 1.0), borderaxespad=0, labelspacing=0.25)
 
 
 def _select_quantities(data: Pairs, most: int) -> list[SampledQuantity]:

@@ -10,7 +10,7 @@ import numpy as np
 from bowdenfit.pages.section import Chart, Series, SeriesGroup
 from bowdenfit.plots.captions import count_shown
 from bowdenfit.plots.curves import choose_evenly
-from bowdenfit.plots.layout import legend_above, panels, text_width
+from bowdenfit.plots.layout import EDGE, RIGHT, axes_at, empty_page, legend_above, text_width
 from bowdenfit.plots.panels import shorten_name
 from bowdenfit.plots.strips import NONE
 from bowdenfit.plots.style import (
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 HEADING = "Measured and predicted efficiencies"
 ROW, LEAST, MOST = 0.155, 0.6, 8.0  # in, height of a labeled row and of the panels
-GAP, ABOVE = 0.2, 0.23  # in, between the panels, and above them with a name in two lines below
+GAP, BELOW, ABOVE = 0.2, 0.6, 0.08  # in, between the panels, below and above them
 LONGEST, LABELS = 34, 0.3  # characters of a label, and share of the page that labels take at most
 STRIP = 0.42  # of the rest, for the residuals
 MOST_POINTS = 500  # rows that a chart shows; a judgement
@@ -79,7 +79,11 @@ def draw(data: Residuals, width: float | None = None) -> Figure:
     page = width or WIDE
     labels = _shorten_labels(data.points, LABELS * page)
     inner = float(np.clip(ROW * len(labels), LEAST, MOST))
-    figure, (main, strip) = panels([inner], 2, ABOVE, (GAP, 0.0), page, (1 - STRIP, STRIP), sharey=True)
+    figure = empty_page(page, inner + BELOW + ABOVE)
+    left = EDGE + 0.08 + max(map(text_width, labels))
+    room = page - left - RIGHT - GAP
+    main = axes_at(figure, left, BELOW, (1 - STRIP) * room, inner)
+    strip = axes_at(figure, left + (1 - STRIP) * room + GAP, BELOW, STRIP * room, inner, sharey=main)
     what = f"predicted {MEDIAN.lower()}" if len(data.points[0].predicted) > 1 else LEAST_SQUARES.lower()
     _draw_rows(main, data.points, residual=False)
     _draw_rows(strip, data.points, residual=True)

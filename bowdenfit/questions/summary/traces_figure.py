@@ -10,11 +10,12 @@ import numpy as np
 from bowdenfit.plots.captions import explain_symbols
 from bowdenfit.plots.layout import (
     EDGE,
-    drop_unused,
+    axes_at,
+    empty_page,
     line_entry,
     number_below,
     number_left,
-    panels,
+    place_labels,
     wrap_words,
 )
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
@@ -31,7 +32,7 @@ STRETCHES = 20  # that the path of a chain without other walkers is cut into
 SHARE = 0.98  # of the draws, within the axes
 GRID, MOST_NAMES = 48, 6  # points of a density, and entries of the legend
 NAME, KEY_ROW, LEAST_COLUMN = 0.9, 0.13, 2.6  # in, an entry of the legend, a row of it, and a column of panels
-LEFT, RIGHT, TOP = 0.66, 0.08, 0.5  # in, margins; LEFT of each of the two columns
+LEFT, RIGHT, BOTTOM, TOP = 0.66, 0.08, 0.42, 0.5  # in, margins; LEFT of each of the two columns
 PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width of a marginal
 
 
@@ -81,25 +82,18 @@ def draw(data: Traces, width: float | None = None) -> Figure:
     rows = -(-len(quantities) // columns)
     chains = len(quantities[0].draws) == data.n_ensembles
     key = wrap_words(_legend_title(chains), page - 2 * EDGE)
-    inner = page / columns - LEFT - RIGHT - MARGINAL
-    figure, flat = panels([PANEL] * rows, 2 * columns, 0.05, (0.0, ROW - PANEL), page, (inner, MARGINAL) * columns)
-    flat = [flat[2 * (i % rows * columns + i // rows) + side] for i in range(rows * columns) for side in range(2)]
-    drop_unused(flat, 2 * len(quantities))
+    figure = empty_page(page, TOP + KEY_ROW * key.count("\n") + BOTTOM + rows * ROW - (ROW - PANEL))
     for i, quantity in enumerate(quantities):
-        row = i % rows
-        trace, marginal = flat[2 * i : 2 * i + 2]
+        column, row = divmod(i, rows)
+        left, bottom = LEFT + column * page / columns, BOTTOM + (rows - 1 - row) * ROW
+        inner = page / columns - LEFT - RIGHT - MARGINAL
+        trace = axes_at(figure, left, bottom, inner, PANEL)
         trace.set(xlim=(data.first_step, data.last_step), ylim=quantity.limits(SHARE))
-        marginal.sharey(trace)
+        marginal = axes_at(figure, left + inner + 0.04, bottom, MARGINAL - 0.06, PANEL, sharey=trace)
         marginal.set_axis_off()
         for number, draws in enumerate(np.split(quantity.draws, data.n_ensembles)):
             _draw_ensemble(trace, marginal, quantity, draws, number)
-        _name_axes(trace, quantity.label, last=row == rows - 1 or i == len(quantities) - 1)
-    figure.place_panels()
-    for trace in flat[: 2 * len(quantities) : 2]:
-        number_left(trace)
-        number_below(trace, whole=True)
-        trace.tick_params(labelbottom=bool(trace.get_xlabel()))
-    figure.align_labels()
+        _label_axes(figure, trace, quantity.label, last=row == rows - 1 or i == len(quantities) - 1)
     _draw_legend(figure, data.n_ensembles, key)
     return figure
 
@@ -135,12 +129,17 @@ def _group_draws(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return length * (np.arange(STRETCHES) + 0.5) / n, stretches.T
 
 
-def _name_axes(trace: Axes, label: str, last: bool) -> None:
-    """Write the name of a quantity left of its panel, and below it where no panel follows."""
+def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
+    """Write numbers and the name of a quantity left of its panel, and below it where no panel follows."""
     trace.grid(visible=False)
-    trace.set_ylabel(_wrap_into_two_lines(label), fontsize=SMALL)
+    number_left(trace)
+    number_below(trace, whole=True)
+    trace.set_ylabel(_wrap_into_two_lines(label), fontsize=SMALL, va="center")
     if last:
-        trace.set_xlabel("Step of the sampler", fontsize=SMALL)
+        trace.set_xlabel("Step of the sampler", fontsize=SMALL, va="center")
+    else:
+        trace.tick_params(labelbottom=False)
+    place_labels(figure, trace, 0.5, 0.27)
 
 
 def _wrap_into_two_lines(label: str) -> str:
@@ -164,7 +163,7 @@ def _draw_legend(figure: Figure, n_ensembles: int, key: str) -> None:
     entries = [line_entry(f"Start {number + 1}", linewidth=1.2, **_style(number)) for number in range(named)]
     if named < n_ensembles:
         entries.append(line_entry(f"and {n_ensembles - named} more"))
-    legend = figure.legend(
+    figure.legend(
         handles=entries, title=key, title_fontsize=SMALL, loc="upper center", ncols=len(entries), borderaxespad=0.3,
+        bbox_to_anchor=(0.5, 1.0),
     )  # fmt: skip
-    figure.add_above(legend, TOP + KEY_ROW * key.count("\n"))

@@ -11,9 +11,13 @@ import numpy as np
 from bowdenfit.addons.fleet.pool.words import HEADINGS, pool_page, pool_text
 from bowdenfit.outputs import write_text
 from bowdenfit.plots.layout import (
+    LEFT,
+    RIGHT,
     TITLE,
+    axes_at,
+    empty_page,
     legend_above,
-    panels,
+    place_labels,
     text_width,
     title_above,
 )
@@ -74,12 +78,16 @@ def draw_coefficients(pool: Pool, width: float | None = None) -> Figure:
     shown = [cable for i, cable in enumerate(order) if i % step == 0 or cable.departure]
     page = width or (WIDE if len(columns) > 1 else MEDIUM)
     labels = [shorten_name(cable.cable, LONGEST_NAME) for cable in shown]
+    left = max(0.3, 0.2 + max(map(text_width, labels)))
     across = page >= MEDIUM
+    inner = (page - left - RIGHT - 0.2 * (len(columns) - 1)) / len(columns) if across else page - left - RIGHT
     height = max(0.6, 0.1 + _ROW * len(shown))
     rows = 1 if across else len(columns)
-    figure, flat = panels([height] * rows, len(columns) // rows, TITLE, (0.2, TITLE + _BELOW), page)
-    inner = page / (len(columns) // rows) - max(map(text_width, labels)) / len(columns)
-    for i, (name, axes) in enumerate(zip(columns, flat, strict=True)):
+    figure = empty_page(page, rows * (TITLE + height + _BELOW))
+    panels = []
+    for i, name in enumerate(columns):
+        bottom = _BELOW + (rows - 1 - (0 if across else i)) * (TITLE + height + _BELOW)
+        axes = axes_at(figure, left + (i * (inner + 0.2) if across else 0.0), bottom, inner, height)
         for y, cable in enumerate(shown):
             pooled = cable.wear if name == "wear" else cable.coefficients.get(name)
             _draw_cable(axes, y, pooled, cable.unpooled.get(name), bool(cable.departure), name == "wear")
@@ -88,7 +96,9 @@ def draw_coefficients(pool: Pool, width: float | None = None) -> Figure:
         axes.set(ylim=(-0.7, len(shown) - 0.3), xlabel=_axis_label(pool, name))
         axes.grid(axis="y", visible=False)
         axes.locator_params(axis="x", nbins=max(2, int(inner / 0.55)))
-    legend_above(figure, flat, columns=3)
+        place_labels(figure, axes)
+        panels.append(axes)
+    legend_above(figure, panels, columns=3)
     return _add_title(figure, "pooled-coefficients", pool)
 
 
@@ -162,14 +172,16 @@ def _choose_cycle_unit(curves: Curves) -> float:
 
 
 def _make_panel(width: float | None) -> tuple[Figure, Axes]:
-    figure, (axes,) = panels([_HEIGHT], 1, 0.12, (0.0, 0.0), width or MEDIUM)
-    return figure, axes
+    page = width or MEDIUM
+    figure = empty_page(page, 0.12 + _HEIGHT + _BELOW)
+    return figure, axes_at(figure, LEFT, _BELOW, page - LEFT - 2 * RIGHT, _HEIGHT)
 
 
 def _finish_curves(figure: Figure, axes: Axes, curves: Curves, name: str, pool: Pool) -> Figure:
     scale = _choose_cycle_unit(curves)
     axes.set(xlim=(0.0, float(curves.cycles[-1]) / scale), xlabel="Cycles (thousands)" if scale > 1 else "Cycles")
     axes.locator_params(axis="x", nbins=6)
+    place_labels(figure, axes)
     legend_above(figure, [axes], columns=4)
     return _add_title(figure, name, pool)
 

@@ -181,8 +181,6 @@ def smooth_input(force: Vector) -> Vector:
     Args:
         force: Force of the blocks of a recording [N].
     """
-    from scipy.optimize import isotonic_regression  # here, because tables without recordings must not wait for it
-
     noise = _noise(force)
     smooth = _smooth(force, noise)
     heading = last_contact(play(smooth, _TURNS * noise)[1])
@@ -196,7 +194,7 @@ def smooth_input(force: Vector) -> Vector:
             heading[turn:stop] = heading[stop]
             stop = turn
         up = 1.0 if heading[start] >= 0 else -1.0
-        likely[start:stop] = up * isotonic_regression(up * smooth[start:stop]).x
+        likely[start:stop] = up * _isotonic(up * smooth[start:stop])
         start = stop
     return likely
 
@@ -210,11 +208,30 @@ def _noise(force: Vector) -> float:
 
 def _smooth(force: Vector, noise: float) -> Vector:
     """Return the force smoothed over few blocks, and as it was read where that changes it by more than noise does."""
-    from scipy.signal import savgol_filter  # here, because tables without recordings must not wait for it
-
     if len(force) < _WIDTH:
         return force
-    smooth = savgol_filter(force, _WIDTH, _DEGREE)
+    powers = np.vander(np.linspace(-1.0, 1.0, _WIDTH), _DEGREE + 1)
+    through = powers @ np.linalg.pinv(powers)  # what the polynomial through a window says of each block in it
+    half, ahead, behind = _WIDTH // 2, through @ force[:_WIDTH], through @ force[-_WIDTH:]
+    smooth = np.concatenate([ahead[:half], np.correlate(force, through[half], "valid"), behind[-half:]])
     if noise < _NOISY * float(np.median(np.abs(np.diff(smooth)))):
         return force
     return np.where(np.abs(smooth - force) < _BEYOND * noise, smooth, force)
+
+
+def _isotonic(force: Vector) -> Vector:
+    """Return the rising series nearest to a force, by pooling neighbours that fall (Barlow et al. 1972).
+
+    SciPy has this and the polynomials too, but loading it takes longer than reading recordings.
+    """
+    means, counts = np.empty(len(force)), np.empty(len(force), int)
+    last = -1
+    for value in force:
+        mean, count = value, 1
+        while last >= 0 and means[last] >= mean:
+            mean = (means[last] * counts[last] + mean * count) / (counts[last] + count)
+            count += counts[last]
+            last -= 1
+        last += 1
+        means[last], counts[last] = mean, count
+    return np.repeat(means[: last + 1], counts[: last + 1])

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -27,13 +28,16 @@ _HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
 _STYLES = (_HERE / "page.css", _HERE / "uplot" / "uPlot.min.css")  # the second of charts alone
 
 
-def render_page(page: HtmlPage, drawings: Mapping[str, bytes]) -> str:
+def render_page(
+    page: HtmlPage, drawings: Mapping[str, bytes], narrow: Mapping[str, bytes] = MappingProxyType({})
+) -> str:
     """A page as HTML.
 
     Args:
         page: Contents of the page.
         drawings: Its figures as PNG, by name; a figure without one is left out, and one for which there is no room is said to
             be.
+        narrow: Drawings that are shown instead on a phone, by name, as far as there is room.
 
     Raises:
         ValueError: A drawing is no PNG.
@@ -45,6 +49,10 @@ def render_page(page: HtmlPage, drawings: Mapping[str, bytes]) -> str:
         image = "" if picture.alone else _image_tag(drawings[picture.name], picture.title)
         room -= len(image)
         pieces[2 * i + 1] = image if room > 0 else TOO_LARGE
+        if room > 0 and picture.name in narrow and len(phone := _image_source(narrow[picture.name])) < room:
+            room -= len(phone)
+            source = f'<source media="(max-width: 40rem)" srcset="{phone}">'
+            pieces[2 * i + 1] = f'<picture class="fits">{source}{image}</picture>'
     return "".join(pieces)
 
 

@@ -55,7 +55,8 @@ SHAPES = {
 
 
 def described(curve: str, **more: Any):
-    contact = {"name": "sheath", "friction": "mu", "wrap_angle": {"curve": curve, "column": "sheath_angle"}}
+    angle = {"curve": curve, "column": "sheath_angle", "departure": "none"}
+    contact = {"name": "sheath", "friction": "mu", "wrap_angle": angle}
     tables = {"angles": {"file": "angles.csv", "detection_limit": {"value": LIMIT, "unit": "deg"}}}
     route = {"variable": "cable_length", "unit": "mm", "range": [400, 600]}
     return parse_description({"name": "one sheath", "route": route, "contact": [contact], "tables": tables} | more)
@@ -186,7 +187,7 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     folder = tmp_path_factory.mktemp("curves")
     (folder / "cable.toml").write_text(
         'name = "One sheath"\n[route]\nrange = [400, 600]\n[[contact]]\nname = "sheath"\nfriction = "mu"\n'
-        'wrap_angle = { curve = "gaussian", column = "sheath_angle" }\n[tables]\n'
+        'wrap_angle = { curve = "gaussian", column = "sheath_angle", departure = "none" }\n[tables]\n'
         'angles = { file = "angles.csv", detection_limit = { value = 10, unit = "deg" } }\n'
         'efficiencies = { file = "efficiencies.csv" }\n'
         "[sampler]\nn_walkers = 48\nmax_steps = 1200\ntarget_ess = 200\ntarget_r_hat = 1.05\n"

@@ -60,7 +60,8 @@ def route(folder, seed, shape, curve, n=25):
     places = np.array([440.0, 490.0, 540.0])
     loss = 0.15 * np.deg2rad(ROUTES[shape]((places - 490) / 60))
     rows = hand_bench.pull(generator, places, loss, (40, 80), repeats=3, noise=(0.3, 0.3), scatter=0.01)
-    hand_bench.write(folder, rows, ROUTE.replace("gaussian", curve), "cable_length_mm")
+    described = ROUTE.replace('curve = "gaussian"', f'curve = "{curve}", departure = "none"')
+    hand_bench.write(folder, rows, described, "cable_length_mm")
     cells = [
         f"{length:g},{angle:.2f}" if angle >= 5 else f"{length:g},<5" for length, angle in zip(lengths, angles, strict=True)
     ]
@@ -245,6 +246,8 @@ def test_the_verdict_names_the_curve_that_would_fit(tmp_path):
     remedy = "contact.0.wrap_angle.curve=gaussian"
     assert f"--set {remedy}" in reasons
     assert bf.fit(folder, settings=[remedy], mcmc=False).verdict().trusted
+    departing = bf.fit(folder, settings=["contact.0.wrap_angle.departure=smooth"], mcmc=False).verdict()
+    assert f"--set {remedy}." in " ".join(departing.reasons)
     reasons = " ".join(bf.fit(route(tmp_path, 2, "parabola", "line"), mcmc=False).verdict().reasons)
     assert ("sheath angle" in reasons and "A line curve does not follow" in reasons) or "Neither a line curve" in reasons
 

@@ -29,6 +29,7 @@ from bowdenfit.physics.distributions import (
     student_bound_residual,
     student_residual,
 )
+from fits import NO_DEPARTURES
 
 pytestmark = pytest.mark.extended
 
@@ -333,7 +334,7 @@ def _mistyped(on_body: Path, folder: Path) -> Path:
 
 def _best_fits(noise: str, folders: tuple[Path, Path]) -> list[dict[str, float]]:
     """Values of the parameters at the maximum of the posterior of each data set, as the first one's priors have it."""
-    posteriors = [LogDensity(build_model(load_dataset(folder, [f'noise="{noise}"']))) for folder in folders]
+    posteriors = [LogDensity(build_model(load_dataset(folder, [f'noise="{noise}"', *NO_DEPARTURES]))) for folder in folders]
     space, objective = posteriors[0].model.space, make_objective(posteriors[0])
     z = [find_maximum_posterior(posterior, objective).z for posterior in posteriors]
     return [{name: float(value) for name, value in space.constrain(jnp.asarray(point)).items()} for point in z]

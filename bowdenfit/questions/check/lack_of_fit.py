@@ -228,16 +228,15 @@ def _suggest_curve(fit: Record, column: str) -> str:
     family, smooth = contact.wrap_angle.curve, f"--set contact.{number}.wrap_angle.departure=smooth"
     others = [name for name in CURVES if name != family]
     fitting = [name for name in others if curve_family_fits(fit.dataset, number, name)]
-    if fit.dataset.description.departs(contact.wrap_angle):
+    departs = fit.dataset.description.departs(contact.wrap_angle)
+    if fitting:
+        flags = " or ".join(f"--set contact.{number}.wrap_angle.curve={name}" for name in fitting)
+        otherwise = "" if departs else f", or with {smooth} if the route has no known curve"
+        return f"A {family} curve does not follow these angles and forces; fit again with {flags}{otherwise}."
+    if departs:
         return (
             f"These angles depart from a {family} curve, and not smoothly either; narrow the range under [route] to where they "
             "do, or measure the angle with each run."
-        )
-    if fitting:
-        flags = " or ".join(f"--set contact.{number}.wrap_angle.curve={name}" for name in fitting)
-        return (
-            f"A {family} curve does not follow these angles and forces; fit again with {flags}, or with {smooth} if the route "
-            "has no known curve."
         )
     return (
         f"Neither a {family} curve nor any other family ({listed(others)}) follows these angles; fit again with {smooth}, "

@@ -200,6 +200,8 @@ def draw_true_values(
 ) -> dict[str, float]:
     """Return the true value of every parameter [internal units]: as given in shown units, else drawn from its prior.
 
+    Angles do not depart from their curves unless that is given.
+
     Args:
         description: The cable.
         tables: Tables of the shape of what is measured.
@@ -223,6 +225,7 @@ def draw_true_values(
     prior_draw = np.asarray(_evaluate_program(draw, key, run_once=run_once)) if needs_draw else np.zeros(space.size)
     values = {p.name: float(v) for p, v in zip(space.free, prior_draw, strict=True)}
     values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
+    values |= {p.name: 0.0 for p in space.free if p.role == "departure"}
     return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
 
 

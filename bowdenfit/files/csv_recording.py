@@ -228,12 +228,12 @@ def read_start(path: Path, data: bytes) -> Sheet:
     below = [row for row in rows if row.start >= first.start]
     layout = _take_units_of_labview(_fit_layout(path, layout, below, separator, above), separator, above)
     texts = {line.row: (ABOVE, " ".join(line.text.split())) for line in above if line.row not in layout.over}
-    others = explain_lines([line for line in above if line.row in texts], rows, texts, _COMMENTS)
+    reasons = explain_lines([line for line in above if line.row in texts], rows, texts, _COMMENTS)
     width = len(layout.kinds)
     for line in above:
-        if others.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width:
+        if reasons.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width:
             refuse_other_separator(path.name, line.row, line.text.strip(), width, layout.numeric)
-    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), others)
+    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), reasons)
 
 
 def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:

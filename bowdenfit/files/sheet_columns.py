@@ -140,7 +140,7 @@ def read_arrays(sheet: SheetRows) -> SheetColumns:
     """
     cells = _read_rows(sheet)
     stop = _find_data_end(cells.row_kinds)
-    left_out, beside = _explain_rows(sheet, cells, stop)
+    left_out, remarks_beside = _explain_rows(sheet, cells, stop)
     dropped = {RowKind.COMMENT, RowKind.REMARK} | ({RowKind.SPACE} if sheet.of_text else set())
     retained = ~np.isin(np.array(cells.row_kinds[:stop]), list(dropped))
     columns: list[Vector | None] = [None] * len(sheet.layout.kinds)
@@ -158,8 +158,8 @@ def read_arrays(sheet: SheetRows) -> SheetColumns:
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
-    remarks = _describe_left_out(sheet, cells.row_kinds, left_out, beside, stop)
-    return SheetColumns(columns, remarks, left_out, beside, len(cells.row_kinds), starts)
+    remarks = _describe_left_out(sheet, cells.row_kinds, left_out, remarks_beside, stop)
+    return SheetColumns(columns, remarks, left_out, remarks_beside, len(cells.row_kinds), starts)
 
 
 def _explain_rows(

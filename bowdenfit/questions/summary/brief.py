@@ -21,7 +21,6 @@ from bowdenfit.questions.recorded.presliding import estimate_presliding
 from bowdenfit.questions.summary.usable_answers import find_usable_answers
 from bowdenfit.questions.summary.verdict import (
     BETWEEN_MOUNTINGS,
-    assess_fit,
     assess_for,
     collect_checked_readings,
     distrust_warning,
@@ -54,13 +53,14 @@ def summary_text(fit: Record, purpose: Purpose = "design") -> str:
         purpose: What the answer is for; it comes first.
     """
     (answer, verdict), outlier_lines = _sentence_lines(fit, purpose), _outlier_lines(fit)
+    fit_verdict = assess_for(fit, purpose)
     sentences = [*answer, *verdict]
     shown, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - len(outlier_lines) - _OTHER_LINES)
-    if not complete and assess_fit(fit).trusted and not assess_fit(fit).doubts:  # that all readings agree is said above already
+    if not complete and fit_verdict.trusted and not fit_verdict.doubts:  # that all readings agree is said above already
         longer, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - _OTHER_LINES + 1)
         shown, outlier_lines = (longer, []) if complete else (shown, outlier_lines)
     below = [line for block in (shown, outlier_lines, [_MORE]) for line in (["", *block] if block else [])]
-    further = filled(interval_width_caveat(fit)).splitlines() if assess_fit(fit).trusted else []
+    further = filled(interval_width_caveat(fit)).splitlines() if fit_verdict.trusted else []
     if further and sum(map(len, sentences)) + len(further) + len(below) <= LINES:
         verdict.insert(-1, further)
     return "\n".join([*_shorten_to(answer, verdict, LINES - len(below)), *below]) + "\n"
@@ -86,12 +86,12 @@ def _sentence_lines(fit: Record, purpose: Purpose) -> tuple[list[list[str]], lis
     Of a fit that is not to be trusted, why comes first and the answer last.
     """
     fit_verdict, name = assess_for(fit, purpose), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
-    first, *others = summary_sentences(fit, purpose)
+    first, *further = summary_sentences(fit, purpose)
     first = first[0].lower() + first[1:]
     if fit_verdict.trusted:
         # the lengths that are good enough
         n_first = 1 if fit.dataset.description.route is not None and purpose == "design" else 0
-        answer = [f"{name}: {first}", *others[:n_first], widening_sentence(fit), *others[n_first:]]
+        answer = [f"{name}: {first}", *further[:n_first], widening_sentence(fit), *further[n_first:]]
         verdict = [*reasons_to_trust(fit), suggest_next_step(fit)]
     else:
         answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]

@@ -1,11 +1,8 @@
 """What readings reveal of smooth departures of wrap angles from their curves, in sentences."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from bowdenfit.cable.curves import Curve
-from bowdenfit.parameters.priors import Prior
 from bowdenfit.results.record import Record
 
 # A departure counts as none where it is smaller than nine tenths of the prior's. A family is refuted where the readings leave a
@@ -59,16 +56,10 @@ def _size(fit: Record, curve: Curve) -> str:
 
 def _odds(fit: Record, curve: Curve) -> float:
     """How much likelier the readings are without than with a departure."""
-    space = fit.model.space
-    names = [name for name in curve.weight_names if name in space.index]
-    columns = [space.index[name] for name in names]
-    posterior_z = fit.draws().flat_z[:, columns]
-    prior_z = np.random.default_rng(0).standard_normal((_N_PRIOR_DRAWS, len(columns)))
-    sizes, prior_sizes = (_root_mean_squares([space.free[i].prior for i in columns], z) for z in (posterior_z, prior_z))
+    weights = [p for p in fit.model.space.free if p.name in curve.weight_names]
+    prior_z = np.random.default_rng(0).standard_normal((len(weights), _N_PRIOR_DRAWS))
+    prior_sizes = np.linalg.norm(
+        [np.asarray(p.prior.constrain(z)) * p.shown_scale for p, z in zip(weights, prior_z, strict=True)], axis=0
+    )
+    sizes = fit.draws().values[curve.rms_name]
     return float(np.mean(sizes < np.quantile(prior_sizes, _SMALL_PROBABILITY))) / _SMALL_PROBABILITY
-
-
-def _root_mean_squares(priors: Sequence[Prior], z: np.ndarray) -> np.ndarray:
-    """Root mean square of each departure [rad], given z of its weights (rows)."""
-    weights = [np.asarray(prior.constrain(column)) for prior, column in zip(priors, z.T, strict=True)]
-    return np.linalg.norm(weights, axis=0)

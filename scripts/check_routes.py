@@ -2,9 +2,10 @@
 
 Two contacts with a curve each and an edge of constant angle; the curves are parabolas, cosines, hyperbolas, logistics, powers,
 kinks, two bells or plateaus with an edge, or true bells (`bell`). Loads of 1 N to 5 kN, 5 to 25 lengths, 3 to 16 mountings,
-noise of 0.7 to 3 deg. The simulator shares no code with the likelihood. Every bench is fitted with each kind of departure.
+noise of 0.7 to 3 deg. The simulator shares no code with the likelihood. Every bench is fitted with a bell that departs
+smoothly or not, and with a smooth curve of no family.
 
-    python scripts/check_routes.py --benches 12 --seed 1 [--only bell kinked] [--departure none smooth] [--workers 2]
+    python scripts/check_routes.py --benches 12 --seed 1 [--only bell kinked] [--departure none smooth no-family] [--workers 2]
 
 Prints one line per fit as it ends, then one line per family and departure: of how many fits the design answer may be used (exit
 code 0); of all answers that may be used, how many of the 90 % intervals of coefficients, best length and efficiency contain the
@@ -26,7 +27,7 @@ import numpy as np
 
 Route = Callable[[np.ndarray], np.ndarray]  # from 0 to 1 over the range to an angle [rad]
 COLUMNS = ("first_angle", "second_angle")
-DEPARTURES = ("none", "smooth")
+DEPARTURES = ("none", "smooth", "no-family")  # from a bell, or a smooth curve instead of one
 
 
 def parabola(rng: np.random.Generator, top: float) -> Route:
@@ -144,9 +145,9 @@ class Bench:
                 forces = np.array([load, load * np.exp(-exponent)]) * (1 + rng.normal(0, self.force_noise, 2))
                 lines.append(f"{number},{self.start + self.span * place:.1f},pull,{forces[0]:.6g},{forces[1]:.6g}")
         (folder / "forces.csv").write_text("\n".join(lines) + "\n")
+        curve = 'curve = "smooth"' if departure == "no-family" else f'curve = "gaussian", departure = "{departure}"'
         contacts = [
-            f'[[contact]]\nname = "{name}"\nfriction = "mu{number}"\n'
-            f'wrap_angle = {{ curve = "gaussian", column = "{name}", departure = "{departure}" }}\n'
+            f'[[contact]]\nname = "{name}"\nfriction = "mu{number}"\nwrap_angle = {{ {curve}, column = "{name}" }}\n'
             for number, name in enumerate(COLUMNS, 1)
         ]
         contacts.append('[[contact]]\nname = "edge"\nfriction = "mu3"\nwrap_angle = { value = 45, unit = "deg" }\n')

@@ -5,7 +5,7 @@ it up. Every family works in z, the route variable from -1 to 1 over the range, 
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.departure import N_FUNCTIONS, VARIANCE_SHARES, departure_functions
+from bowdenfit.cable.departure import DEPARTURE_SHARES, SMOOTH_SHARES, smooth_functions
 from bowdenfit.description import PriorDefaults, Route
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, JohnsonSU, Normal, Prior, Uniform
 from bowdenfit.parameters.space import Parameter
@@ -45,6 +45,8 @@ class Curve(ABC):
     """What the summary calls a table of its derived quantities."""
     not_limited: ClassVar[str] = ""
     """What it means that a derived quantity goes to infinity; empty where none can."""
+    has_family: ClassVar[bool] = True
+    """Whether the curve is of a family that an angle may depart from."""
 
     def __init__(self, column: str, route: Route, departs: bool = False) -> None:
         self.column, self.middle, self.half_width, self.unit = column, route.middle, route.half_width, route.unit
@@ -52,7 +54,7 @@ class Curve(ABC):
         self.names = tuple(f"{column}_{ending}" for ending in self.coefficients)
         self.departs = departs
         self.rms_name = f"{column}_departure_rms"
-        self.weight_names = tuple(f"{column}_departure_{number}" for number in range(1, N_FUNCTIONS + 1))
+        self.weight_names = tuple(f"{column}_departure_{number}" for number in range(1, 1 + len(DEPARTURE_SHARES)) if departs)
 
     @abstractmethod
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
@@ -67,33 +69,24 @@ class Curve(ABC):
         if not self.departs:
             return ()
         scale = defaults.departure_share * _median(detected, defaults)
-        return tuple(
-            Parameter(
-                name, self._symbol(f"w{number}"), f"weight {number} of the departure of the {self.what} from its curve",
-                "departure", JohnsonSU(scale * share), "deg", 1 / _DEGREE,
-            )
-            for number, (name, share) in enumerate(
-                zip(self.weight_names, np.sqrt(VARIANCE_SHARES), strict=True), 1
-            )
-        )  # fmt: skip
+        return self._weights(
+            self.weight_names, f"the departure of the {self.what} from its curve", scale, DEPARTURE_SHARES
+        )
 
     def departure(self, values: Mapping[str, Array], z: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Departure from the family's curve [rad] at z."""
-        functions = departure_functions(z)
+        functions = smooth_functions(z, DEPARTURE_SHARES)
         return sum((values[name] * functions[..., i] for i, name in enumerate(self.weight_names)), jnp.zeros_like(z))
 
     def departure_rms(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """Root mean square of the departure over the range [deg], by name; none if it does not depart."""
         if not self.departs:
             return {}
-        return {self.rms_name: jnp.rad2deg(jnp.linalg.norm(self._weights(values)))}
+        return {self.rms_name: jnp.rad2deg(jnp.linalg.norm(jnp.stack([values[name] for name in self.weight_names])))}
 
     def departure_units(self) -> dict[str, tuple[str, str]]:
         """Unit and symbol of what `departure_rms` gives."""
         return {self.rms_name: ("deg", self._symbol("D"))} if self.departs else {}
-
-    def _weights(self, values: Mapping[str, Array]) -> Float[Array, " functions"]:
-        return jnp.stack([values[name] for name in self.weight_names])
 
     @abstractmethod
     def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
@@ -119,6 +112,18 @@ class Curve(ABC):
     ) -> Parameter:
         name, symbol = f"{self.column}_{ending}", self._symbol(letter)
         return Parameter(name, symbol, meaning, "curve", prior, unit, scale, prior_words=words)
+
+    def _weights(
+        self, names: Sequence[str], meaning: str, scale: float, shares: Mapping[int, float]
+    ) -> tuple[Parameter, ...]:
+        """Weights of polynomials [rad] with these shares of the variance of what has a scale, and the priors of heavy tails."""
+        return tuple(
+            Parameter(
+                name, self._symbol(f"w{number}"), f"weight {number} of {meaning}", "departure",
+                JohnsonSU(scale * root), "deg", 1 / _DEGREE,
+            )
+            for number, (name, root) in enumerate(zip(names, np.sqrt(list(shares.values())), strict=True), 1)
+        )  # fmt: skip
 
     def _symbol(self, letter: str) -> str:
         """Return the letter with the first word of the column."""
@@ -235,6 +240,32 @@ class LogisticCurve(Curve):
         """Return a in degrees, B and C in the unit of the route."""
         units = {"A": "deg", "B": self.unit, "C": self.unit}
         return {f"{self.column}_{x}": (unit, self._symbol(x)) for x, unit in units.items()}
+
+
+class SmoothCurve(Curve):
+    """A smooth curve of no family: a mean angle over the range, and polynomials about it (see `cable.departure`)."""
+
+    coefficients = ("mean", *(f"departure_{degree}" for degree in SMOOTH_SHARES))
+    heading = "Smooth curves"
+    has_family = False
+
+    def __init__(self, column: str, route: Route, departs: bool = False) -> None:
+        del departs  # by whatever it departed would be part of it
+        super().__init__(column, route)
+
+    def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """Return the mean angle over the range, and weights of polynomials about as large as the angles themselves."""
+        median, unit = _median(detected, defaults), ("deg", 1 / _DEGREE)
+        prior, meaning = HalfNormal(defaults.curve_end_over_median * median), f"the smooth curve of the {self.what}"
+        return (
+            self._parameter("mean", "m", f"mean {self.what} over the range", prior, *unit, prior.text(*unit, digits=3)),
+            *self._weights(self.names[1:], meaning, defaults.smooth_over_median * median, SMOOTH_SHARES),
+        )
+
+    def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
+        """Return the mean plus the weighted polynomials, and 0 where that is negative."""
+        mean, *weights = coefficients
+        return jnp.maximum(mean + smooth_functions(z, SMOOTH_SHARES) @ jnp.stack(weights), 0.0)
 
 
 def _median(detected: Vector, defaults: PriorDefaults) -> float:

@@ -1,25 +1,32 @@
-"""Smooth departures of a wrap angle from its family's curve.
+"""Smooth functions of the route variable: departures of a wrap angle from its family's curve, and curves of no family.
 
 No real route is exactly a bell. The angle of a contact is its family's curve plus a smooth function of the route variable, less
 that function's constant and straight line, which the family has already: Legendre polynomials of the second and third degree.
-Their priors are in the proportion that a Gaussian process (Matern, nu = 5/2) with a length scale of 0.6 of half the range gives
-them. Higher degrees would have a fifth of its variance, and cost more time than they make coefficients and lengths truer.
+A smooth curve of no family is a constant plus the polynomials of the first to the fifth degree. The priors of their weights are
+in the proportion that a Gaussian process (Matern, nu = 5/2) with a length scale of 0.6 of half the range gives them. Higher
+degrees of a departure would have a fifth of its variance, and cost more time than they make coefficients and lengths truer.
 
 References:
     Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), equation 4.17, for the process.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-VARIANCE_SHARES = (0.7, 0.3)
-"""Share of the process's variance of each polynomial, of the second degree first."""
-N_FUNCTIONS = len(VARIANCE_SHARES)
+DEPARTURE_SHARES: Mapping[int, float] = MappingProxyType({2: 0.7, 3: 0.3})
+"""Share of a departure's variance of the polynomial of each degree."""
+SMOOTH_SHARES: Mapping[int, float] = MappingProxyType({1: 0.26, 2: 0.115, 3: 0.048, 4: 0.021, 5: 0.009})
+"""Share of the process's whole variance of the polynomial of each degree; that of the constant is the rest."""
 
 
-def departure_functions(z: Float[Array, " rows"]) -> Float[Array, "rows functions"]:
+def smooth_functions(z: Float[Array, " rows"], degrees: Mapping[int, float]) -> Float[Array, "rows functions"]:
     """Legendre polynomials with a mean square of 1 over the range at z, -1 to 1 there; outside as at its nearer end."""
     z = jnp.clip(z, -1.0, 1.0)
-    polynomials = (3 * z**2 - 1) / 2, (5 * z**3 - 3 * z) / 2
-    return jnp.stack([jnp.sqrt(2 * degree + 1.0) * values for degree, values in enumerate(polynomials, 2)], axis=-1)
+    polynomials = [jnp.ones_like(z), z]
+    for n in range(1, max(degrees)):
+        polynomials.append(((2 * n + 1) * z * polynomials[n] - n * polynomials[n - 1]) / (n + 1))
+    return jnp.stack([jnp.sqrt(2 * degree + 1.0) * polynomials[degree] for degree in degrees], axis=-1)

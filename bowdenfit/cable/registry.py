@@ -37,6 +37,7 @@ CURVES = {
     "gaussian": CurveFamily("bowdenfit.cable.curves:GaussianCurve", 3),
     "line": CurveFamily("bowdenfit.cable.curves:LineCurve", 2),
     "logistic": CurveFamily("bowdenfit.cable.curves:LogisticCurve", 3),
+    "smooth": CurveFamily("bowdenfit.cable.curves:SmoothCurve", 6),
 }
 
 

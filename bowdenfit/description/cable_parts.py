@@ -78,6 +78,8 @@ class WrapAngle(Frozen):
             raise ValueError("published_range belongs to a curve")
         if self.departure == "smooth" and self.curve is None:
             raise ValueError('departure = "smooth" belongs to a curve: it is how an angle departs from that')
+        if self.departure is not None and self.curve == "smooth":
+            raise ValueError('curve = "smooth" has no family to depart from: leave departure out, or name a family')
         if self.nominal is not None and self.curve is not None:
             raise ValueError("nominal belongs to an angle measured in each row, without a curve")
         return self

@@ -162,6 +162,7 @@ class PriorDefaults(Frozen):
     curve_steepness_sd: Positive = 5.0
     curve_end_over_median: Positive = 3.0
     departure_share: Positive = 0.05
+    smooth_over_median: Positive = 1.0
     angle_noise_degrees: Positive = 3.0
     run_scatter: Positive = 0.025
     force_noise_share: Positive = 0.02

@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array
 from scipy.special import fdtrc, stdtr
 
-from bowdenfit.cable.departure import N_FUNCTIONS
+from bowdenfit.cable.departure import DEPARTURE_SHARES
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Solution
@@ -223,7 +223,7 @@ def _test_curves(posterior: LogDensity, solution: Solution, system: ResidualGrou
     """
     model = posterior.model
     readings = next((r for r in system.readings if any(r.group) and set(r.group) <= set(model.cable.curves)), None)
-    tested = [column for column, curve in model.cable.curves.items() if not curve.departs]
+    tested = [column for column, curve in model.cable.curves.items() if curve.has_family and not curve.departs]
     if readings is None or not tested or len(model.terms) == 1:  # angles alone were tested against their position
         return
     columns = _derive_by_departures(posterior, solution, tested)
@@ -262,7 +262,7 @@ def _derive_by_departures(posterior: LogDensity, solution: Solution, tested: Seq
         }
         return jnp.concatenate([term.residuals(values | departures, d) for term, d in zip(terms, data, strict=True)])
 
-    none = np.zeros((len(curves), N_FUNCTIONS))
+    none = np.zeros((len(curves), len(DEPARTURE_SHARES)))
     program = compile_program(jax.jacfwd(residuals), none, posterior.data, run_once=True)
     return dict(zip(tested, np.moveaxis(np.asarray(program(none, posterior.data)), 1, 0), strict=True))
 

@@ -280,6 +280,6 @@ def test_too_few_angles_are_counted_against_the_coefficients_of_the_family(tmp_p
 
 def test_an_unknown_family_is_refused_with_the_known_ones(on_body):
     with pytest.raises(
-        bf.DescriptionError, match="the curve 'parabola' is unknown; known here: gaussian, line, logistic"
+        bf.DescriptionError, match="the curve 'parabola' is unknown; known here: gaussian, line, logistic, smooth"
     ):
         check(on_body, settings=["contact.0.wrap_angle.curve=parabola"])

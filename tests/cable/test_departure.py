@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.cable.departure import N_FUNCTIONS, VARIANCE_SHARES, departure_functions
+from bowdenfit.cable.departure import DEPARTURE_SHARES, SMOOTH_SHARES, smooth_functions
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.models import build_model
 from bowdenfit.questions.summary.brief import summary_text
@@ -79,29 +79,37 @@ def write_bench(folder, departure, seed, rising=power, noise_deg=2.4, tau=0.011,
 
 
 def test_functions_are_orthogonal_to_each_other_and_to_straight_lines():
-    functions = np.asarray(departure_functions(jnp.asarray(NODES)))
-    np.testing.assert_allclose((functions.T * WEIGHTS / 2) @ functions, np.eye(N_FUNCTIONS), atol=1e-12)
+    functions = np.asarray(smooth_functions(jnp.asarray(NODES), SMOOTH_SHARES))
+    np.testing.assert_allclose((functions.T * WEIGHTS / 2) @ functions, np.eye(len(SMOOTH_SHARES)), atol=1e-12)
     np.testing.assert_allclose((WEIGHTS / 2) @ functions, 0.0, atol=1e-12)
-    np.testing.assert_allclose((WEIGHTS * NODES / 2) @ functions, 0.0, atol=1e-12)
+    departures = smooth_functions(jnp.asarray(NODES), DEPARTURE_SHARES)
+    np.testing.assert_allclose(departures, functions[:, [1, 2]], rtol=1e-12)
+    np.testing.assert_allclose((WEIGHTS * NODES / 2) @ departures, 0.0, atol=1e-12)
 
 
 def test_shares_are_those_of_the_process_and_what_is_left_out_is_small():
     distance = np.sqrt(5) * np.abs(NODES[:, None] - NODES) / 0.6
     covariance = (1 + distance + distance**2 / 3) * np.exp(-distance)
-    functions = np.asarray(departure_functions(jnp.asarray(NODES))) * WEIGHTS[:, None] / 2
-    variances = np.diag(functions.T @ covariance @ functions)
-    np.testing.assert_allclose(VARIANCE_SHARES, variances / variances.sum(), atol=0.01)
+
+    def variances(shares):
+        functions = np.asarray(smooth_functions(jnp.asarray(NODES), shares)) * WEIGHTS[:, None] / 2
+        return np.diag(functions.T @ covariance @ functions)
+
+    of_departure, of_curve = variances(DEPARTURE_SHARES), variances(SMOOTH_SHARES)
+    np.testing.assert_allclose(list(DEPARTURE_SHARES.values()), of_departure / of_departure.sum(), atol=0.01)
+    np.testing.assert_allclose(list(SMOOTH_SHARES.values()), of_curve, rtol=0.04)
     lines = np.stack([np.ones_like(NODES), np.sqrt(3) * NODES]) * WEIGHTS / 2
     whole = np.sum(WEIGHTS / 2) - np.trace(lines @ covariance @ lines.T)
-    assert variances.sum() > 0.8 * whole
+    assert of_departure.sum() > 0.8 * whole
 
 
 def test_a_departure_is_smooth_and_constant_outside_the_range():
     z = jnp.linspace(-0.99, 0.99, 101)
-    slopes = jax.vmap(jax.jacfwd(lambda z: departure_functions(z[None])[0]))(z)
-    by_differences = (departure_functions(z + 1e-6) - departure_functions(z - 1e-6)) / 2e-6
+    slopes = jax.vmap(jax.jacfwd(lambda z: smooth_functions(z[None], SMOOTH_SHARES)[0]))(z)
+    by_differences = (smooth_functions(z + 1e-6, SMOOTH_SHARES) - smooth_functions(z - 1e-6, SMOOTH_SHARES)) / 2e-6
     np.testing.assert_allclose(slopes, by_differences, atol=1e-6)
-    np.testing.assert_allclose(departure_functions(jnp.array([1.5, 9.0])), departure_functions(jnp.ones(2)), rtol=1e-12)
+    ends = [smooth_functions(jnp.array(z), SMOOTH_SHARES) for z in ([1.5, 9.0], [1.0, 1.0])]
+    np.testing.assert_allclose(*ends, rtol=1e-12)
 
 
 @pytest.mark.parametrize("family", ["gaussian", "line", "logistic"])
@@ -116,7 +124,7 @@ def test_each_family_departs_and_is_itself_at_weights_of_0(family, tmp_path):
     names = [p.name for p in plain.space.parameters]
     assert [name for name in (p.name for p in smooth.space.parameters) if "departure" not in name] == names
     further = [p for p in smooth.space.parameters if "departure" in p.name]
-    assert len(further) == 2 * N_FUNCTIONS
+    assert len(further) == 2 * len(DEPARTURE_SHARES)
     values = smooth.space.constrain(jnp.zeros(smooth.space.size))
     route = jnp.linspace(1800.0, 2500.0, 9)
     np.testing.assert_allclose(smooth.cable.wrap_angles(values, route), plain.cable.wrap_angles(values, route), rtol=1e-12)
@@ -132,6 +140,29 @@ def test_angles_depart_unless_stated_otherwise_and_not_in_the_published_geometry
     assert departing("contact.1.wrap_angle.departure=none") == [True, False]
     assert departing("geometry=published") == [False, False]
     assert departing("geometry=published", "contact.0.wrap_angle.departure=smooth") == [True, False]
+
+
+def test_a_smooth_curve_follows_angles_of_no_known_family(tmp_path):
+    def two_bells(x):
+        return 0.05 + np.exp(-((x - 0.15) ** 2) / 0.06) + 0.7 * np.exp(-((x - 0.9) ** 2) / 0.05)
+
+    def rms(curve):
+        file = write_bench(tmp_path, "none", 4, rising=two_bells, noise_deg=1.0) / "cable.toml"
+        departure = '"gaussian", column = "rising", departure = "none"'
+        file.write_text(file.read_text().replace(departure, f'"{curve}", column = "rising"'))
+        fit = bf.fit(tmp_path, mcmc=False, seed=1, figures=False)
+        x = np.linspace(0, 1, 101)
+        values = fit.model.space.constrain(jnp.asarray(fit.least_squares.z))
+        angle = fit.model.cable.curves["rising"].wrap_angle(values, jnp.asarray(1800 + 700 * x))
+        return np.sqrt(np.mean((np.rad2deg(np.asarray(angle)) - np.rad2deg(two_bells(x))) ** 2))
+
+    assert rms("smooth") < 3.0 < rms("gaussian")
+
+
+def test_a_smooth_curve_has_no_family_to_depart_from():
+    angle = {"curve": "smooth", "column": "a", "departure": "none"}
+    with pytest.raises(bf.DescriptionError, match="no family to depart from"):
+        parse_description({"name": "x", "contact": [{"name": "a", "friction": "mu", "wrap_angle": angle}]})
 
 
 def test_a_departure_needs_a_curve():

@@ -226,7 +226,8 @@ def _suggest_curve(fit: Record, column: str) -> str:
     contacts = fit.dataset.description.contact
     number, contact = next((i, c) for i, c in enumerate(contacts) if c.wrap_angle.column == column)
     family, smooth = contact.wrap_angle.curve, f"--set contact.{number}.wrap_angle.departure=smooth"
-    others = [name for name in CURVES if name != family]
+    has_family = contact.wrap_angle.departure is not None  # a smooth curve has none to depart from
+    others = [name for name in CURVES if name != family and not (has_family and name == "smooth")]
     fitting = [name for name in others if curve_family_fits(fit.dataset, number, name)]
     departs = fit.dataset.description.departs(contact.wrap_angle)
     if fitting:

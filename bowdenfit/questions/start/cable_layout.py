@@ -170,8 +170,8 @@ def _add_curved_contacts(file: MeasuredFile, layout: CableLayout, asker: Asker) 
             layout, f"What is the place called whose wrap angle is {shown(column.name)}?", _propose_name(column), asker
         )
         shape = (
-            "How does that angle follow the length: gaussian (a bell, largest at some length), line (a straight line) or "
-            "logistic (from 0 to a plateau)? bowdenfit compare says whether another fits better."
+            "How does that angle follow the length: gaussian (a bell, largest at some length), line (a straight line), "
+            "logistic (from 0 to a plateau) or smooth (no known curve)? bowdenfit compare says whether another fits better."
         )
         curve = asker.ask(word_question(shape, sorted(CURVES), _DEFAULT_CURVE))
         assign_column(file, Quantity(column.plain_name, "angle"), column, asker)

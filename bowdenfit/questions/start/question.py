@@ -28,7 +28,7 @@ PARAMETER_NAMES = {
 }  # fmt: skip
 """Names of all parameters that belong neither to a contact, a column nor a run: coefficients may not use them."""
 _RUN_PARAMETER = re.compile(r"(amplitude|displacement_zero|release|rest)_\d+")
-_CURVE_PARAMETERS = ("a", "b", "c", "A", "B", "C", "middle", "slope")  # endings, behind the name of the column
+_CURVE_PARAMETERS = ("a", "b", "c", "A", "B", "C", "middle", "slope", "mean")  # endings, behind the name of the column
 _NAME = TypeAdapter[str](Name)
 
 

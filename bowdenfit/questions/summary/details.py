@@ -129,7 +129,7 @@ def _identified_sentence(fit: Record) -> str:
 
 def _prior_driven_sentence(fit: Record, page: dict[str, Any]) -> str:
     """Name the parameters that rest on their prior almost alone, but for weights of departures; empty without any."""
-    weights = {name for curve in fit.model.cable.curves.values() for name in curve.weight_names}
+    weights = {p.name for p in fit.model.space.free if p.role == "departure"}
     names = [
         n
         for n, p in page["parameters"].items()

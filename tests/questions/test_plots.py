@@ -69,7 +69,7 @@ def angle_curve(contact, at_start, at_end, outside):
     seen = angle >= 10.0
     return AngleCurve(
         contact, Band(GRID, median * (1 + 0.05 * SPREAD)), route[seen], angle[seen], route[~seen],
-        np.full((~seen).sum(), 10.0), np.array([540.0, 550.0]), np.array(outside),
+        np.full((~seen).sum(), 10.0), np.array([540.0, 550.0]), np.array(outside), 1.1 * median,
     )  # fmt: skip
 
 

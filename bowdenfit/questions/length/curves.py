@@ -1,6 +1,9 @@
 """Efficiency and wrap angles along the route with their uncertainty."""
 
+from functools import partial
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
@@ -12,8 +15,9 @@ from bowdenfit.plots.curves import BAND_QUANTILES, Band
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.questions.length.wrap_angles_figure import AngleCurve
 from bowdenfit.results.along_route import route_grid
-from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit
+from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, thinned_parameter_values
 
+_FAMILY_DRAWS = 400  # of the family's curve without its departure, of which only the median is drawn
 _DRAWS = 5000  # from so many draws a quantile is off by less than the width of a line on paper
 
 
@@ -83,4 +87,17 @@ def _collect_angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
         np.rad2deg(limit[inside & ~detected]),
         table.route[~inside & detected],
         np.rad2deg(angle[~inside & detected]),
+        _compute_family_alone(fit, column, band.route),
     )
+
+
+def _compute_family_alone(fit: Record, column: str, route: np.ndarray) -> np.ndarray:
+    """Median of the family's curve without its departure [deg] along the route; empty where it does not depart."""
+    curve = fit.model.cable.curves[column]
+    if not curve.departs:
+        return np.empty(0)
+    values = thinned_parameter_values(fit, _FAMILY_DRAWS)
+    with jax.enable_x64(True):
+        z = jnp.asarray((route - curve.middle) / curve.half_width)
+        angles = jax.vmap(partial(curve.at, z))(*(jnp.asarray(values[name]) for name in curve.names))
+    return np.rad2deg(np.median(np.asarray(angles), axis=0))

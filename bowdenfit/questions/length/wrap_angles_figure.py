@@ -11,7 +11,7 @@ from bowdenfit.plots.captions import describe_strip
 from bowdenfit.plots.curves import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.strips import panels_with_strips
-from bowdenfit.plots.style import BLACK, WRAP_ANGLE, in_paper_style
+from bowdenfit.plots.style import BLACK, SERIES_LINES, VERMILLION, WRAP_ANGLE, in_paper_style
 from bowdenfit.questions import length
 from bowdenfit.words import counted
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Wrap angle along the route"
+FAMILY_ALONE = "Family alone"
 MOST_COLUMNS, HEIGHT = 3, 1.8  # panels in a row, and height of one [in]
 
 
@@ -33,6 +34,7 @@ class AngleCurve:
         route, angle: Detected readings inside the range of the curve.
         undetected_route, limit: Readings below the detection limit inside the range.
         outside_route, outside_angle: Readings outside the range, which the curve does not use.
+        family_alone: The family's curve without its departure, where the band has its points; empty where it does not depart.
     """
 
     contact: str
@@ -43,6 +45,7 @@ class AngleCurve:
     limit: np.ndarray
     outside_route: np.ndarray
     outside_angle: np.ndarray
+    family_alone: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,8 @@ def caption(data: WrapAngles) -> str:
         f"Wrap angle of {counted(len(data.curves), 'contact')} along the route, with the curve through the readings.",
         "Line: median; bands: the intervals that hold the curve with 50 % and 90 % probability."
         if has_draws else "Line: least squares.",
+        "Dashed: the curve's family alone, without its smooth departure."
+        if any(len(c.family_alone) for c in data.curves) else "",
         "Hatched: too small to be read, so anything between zero and the triangle." if limits else "",
         "Squares: outside the range of the curve, which does not use them." if unused else "",
         describe_strip("in degrees"),
@@ -85,6 +90,8 @@ def draw(data: WrapAngles, width: float | None = None) -> Figure:
     panels = panels_with_strips(names, [shown] * len(names), [top] * len(names), MOST_COLUMNS, HEIGHT, width)
     for axes, strip, curve in zip(panels.mains, panels.strips, data.curves, strict=True):
         draw_band(axes, curve.band)
+        if len(curve.family_alone):
+            axes.plot(curve.band.route, curve.family_alone, color=VERMILLION, linestyle=SERIES_LINES[1], label=FAMILY_ALONE)
         _draw_readings(axes, curve)
         strip.plot(curve.route, _residuals(curve), "o", color=BLACK, markersize=3.6)
         shade_outside(strip, data.route_range, shown)

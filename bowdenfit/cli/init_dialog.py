@@ -40,7 +40,7 @@ class Terminal:
     def ask(self, question: Question[Answer]) -> Answer:
         """Ask until there is a valid answer, and return it."""
         say("")
-        say(filled(question.words))
+        say(filled(question.words + (" (y or n)" if question.form == "yes or no" else "")))
         for i, option in enumerate(question.options, start=1):
             say(filled(f"{i}  {option}", "  "))
         if question.default is None:

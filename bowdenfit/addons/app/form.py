@@ -9,7 +9,6 @@ from bowdenfit.errors import BowdenfitError
 from bowdenfit.questions.start.question import Question
 
 Answer = TypeVar("Answer")
-_YES_OR_NO = " (y or n)"
 
 
 class UnansweredError(Exception):
@@ -78,10 +77,9 @@ class Form:
 
     def _note(self, key: str, question: Question[Any], typed: str, fault: str) -> None:
         """Add a question to the form."""
-        words = question.words.removesuffix(_YES_OR_NO)
         options = tuple((str(i), option) for i, option in enumerate(question.options, start=1))
-        if question.words.endswith(_YES_OR_NO):
+        if question.form == "yes or no":
             options = (("y", "yes"), ("n", "no"))
         hint = question.why or (f"such as {question.example}" if question.example and not options else "")
-        is_list = words.endswith("Write their numbers separated by spaces.")
-        self.entries.append(FormEntry(key, words, typed, hint, () if is_list else options, fault))
+        choices = () if question.form == "several" else options
+        self.entries.append(FormEntry(key, question.words, typed, hint, choices, fault))

@@ -202,7 +202,7 @@ def _several_columns_question(words: str, columns: Sequence[FileColumn], file: s
 
     reason = f"{file} does not say which of its columns are wrap angles; write their unit into their headings."
     options = tuple(column.words for column in columns)
-    return Question(f"{words} Write their numbers separated by spaces.", read, None, reason, "1", options)
+    return Question(f"{words} Write their numbers separated by spaces.", read, None, reason, "1", options, "several")
 
 
 def _assign_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:

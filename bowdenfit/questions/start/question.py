@@ -6,7 +6,7 @@ Names are refused at once where `check` would refuse them later, in the same wor
 import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar, runtime_checkable
+from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -43,6 +43,7 @@ class Question(Generic[Answer]):
         why: What the files do not say, and what would say it, in a sentence; with a default beside it, that is only proposed.
         example: An answer where there is no default, to show how it is written.
         options: Answers that may be given by a number, from 1, each in words.
+        form: How it is answered: by a text, by one of the options, by the numbers of several, or by yes or no.
     """
 
     words: str
@@ -51,6 +52,7 @@ class Question(Generic[Answer]):
     why: str = ""
     example: str = ""
     options: tuple[str, ...] = ()
+    form: Literal["text", "choice", "several", "yes or no"] = "text"
 
 
 @runtime_checkable
@@ -108,7 +110,7 @@ def yes_no_question(words: str, default: bool, why: str = "") -> Question[bool]:
             raise UsageError(f"{shown(typed)} is neither yes nor no; write y or n.")
         return answer in _YES
 
-    return Question(f"{words} (y or n)", read, "y" if default else "n", why)
+    return Question(words, read, "y" if default else "n", why, form="yes or no")
 
 
 def choice_question(
@@ -136,6 +138,7 @@ def choice_question(
         why,
         "1",
         tuple(description for description, _ in options),
+        "choice",
     )
 
 

@@ -26,7 +26,8 @@ from bowdenfit.kinds.descriptions import (
     order_groups,
     parse_description,
 )
-from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind, require_recordings
+from bowdenfit.kinds.fit_command import make_ambiguity_error, require_recordings
+from bowdenfit.kinds.lone_file import WRAP_ANGLE, understand
 from bowdenfit.kinds.measured_columns import refuse_far_forces
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
@@ -166,8 +167,11 @@ def single_file_dataset(
     if join is not None:
         require_recordings((path, join), bool(channels), tuple(columns or ()))
         kind = "recordings"
-    kind = kind or require_one_kind(path, bool(channels), tuple(columns or ()))
-    if has_own_angles(path, kind, tuple(columns or ()), wrap_angle is not None):
+    file = None if kind == "recordings" else understand(path, channels, columns, is_whole=False)
+    if file is not None and file.kind.other and not kind:
+        raise make_ambiguity_error(file)
+    kind = kind or (file.kind.kind if file else "")
+    if file is not None and file.has_own_angles(wrap_angle is not None):
         angle: dict[str, Any] = {"column": WRAP_ANGLE.name}
     elif wrap_angle is None:
         raise DescriptionError(

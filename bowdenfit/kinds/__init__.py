@@ -3,7 +3,8 @@
 Imports go downward only (a contract of import-linter in pyproject.toml holds that):
 
     fit_command  covariates  run_parts                   commands that fit a lone file; covariates of readings; parts of runs
-    file_kind  terms                                     what a lone file holds; TERMS, the kinds in the likelihood (JAX)
+    lone_file                                            what is understood of a lone file
+    file_kind  terms                                     the kind of a lone file; TERMS, the kinds in the likelihood (JAX)
     descriptions                                         cable.toml and plans, with a field for every kind
     this module                                          KINDS: the kinds that read and describe tables (NumPy)
     forces                                               also plans runs, as those of tables and of recordings

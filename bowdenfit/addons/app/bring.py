@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from nicegui import ui
 
-from bowdenfit.addons.app.draft import Draft, Refusal, Understanding, UnderstoodColumn, UnderstoodFile
+from bowdenfit.addons.app.draft import Draft, Refusal, Understanding
 from bowdenfit.addons.app.elements import (
     address,
     block,
@@ -26,7 +26,10 @@ from bowdenfit.addons.app.sheet import TypedSheet
 from bowdenfit.addons.app.workbench import KeptFit, Workbench, refuse_folder_name, refuse_module_name
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
+from bowdenfit.kinds.lone_file import FileColumn
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
+from bowdenfit.questions.start.measured_file import MeasuredFile
+from bowdenfit.units import usual_units
 from bowdenfit.words import counted, listed, shown
 
 _BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
@@ -35,6 +38,7 @@ _BENCH_WORDS = (
     "pulls, and return while the load pulls back."
 )
 Again: TypeAlias = Callable[[], Awaitable[None]]
+_DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
 _HEADS = ("column", "unit", "read as", "first", "last", "lowest", "highest")
 
 
@@ -199,7 +203,7 @@ def _remove_button(draft: Draft, name: str, look_again: Again) -> None:
     button("Leave this file out", remove, key=f"remove-{name}", aria_label=f"Leave {name} out")
 
 
-def _show_file(draft: Draft, file: UnderstoodFile, look_again: Again) -> None:
+def _show_file(draft: Draft, file: MeasuredFile, look_again: Again) -> None:
     """Show the columns of a file, whose meanings and units can be changed."""
     with block("section"):
         with block("div", "row"):
@@ -216,23 +220,25 @@ def _show_file(draft: Draft, file: UnderstoodFile, look_again: Again) -> None:
                     _show_column(draft, file, column, number, look_again)
 
 
-def _show_column(draft: Draft, file: UnderstoodFile, column: UnderstoodColumn, number: int, look_again: Again) -> None:
+def _show_column(draft: Draft, file: MeasuredFile, column: FileColumn, number: int, look_again: Again) -> None:
     """Show a column with the menus of its meaning and unit."""
 
     async def state(quantity: str | None = None, unit: str | None = None) -> None:
-        draft.state(file.name, column.heading, quantity, unit)
+        draft.state(file.name, column.name, quantity, unit)
         await look_again()
 
-    meanings = [("", "not used"), *((name, f"{name}: {words}" if words else name) for name, words in file.meanings)]
-    units = [("", "not stated"), *((unit, unit) for unit in column.units)]
-    key = f"{file.name}-{number}"
+    meanings = [("", "not used"), *((name, f"{name}: {words}" if words else name) for name, words in file.meanings.items())]
+    usual = [unit for name in (column.dimension, *_DIMENSIONS) if name for unit in usual_units(name)]
+    units = [("", "not stated"), *((unit, unit) for unit in dict.fromkeys([column.unit, *usual]) if unit)]
+    key, meaning = f"{file.name}-{number}", file.meaning_of(column)
+    ends = (f"{column.low:.5g}", f"{column.high:.5g}") if column.numbers else ("", "")
     with block("tr"):
-        text(column.heading, "th", scope="row", dir="auto")
+        text(column.name, "th", scope="row", dir="auto")
         with block("td", "left"):
-            choice(f"{key}-unit", column.unit, units, lambda unit: state(unit=unit), f"Unit of {column.heading}")
+            choice(f"{key}-unit", column.unit, units, lambda unit: state(unit=unit), f"Unit of {column.name}")
         with block("td", "left"):
-            choice(f"{key}-as", column.meaning, meanings, lambda name: state(quantity=name), f"Meaning of {column.heading}")
-        for value in (column.first, column.last, column.low, column.high):
+            choice(f"{key}-as", meaning, meanings, lambda name: state(quantity=name), f"Meaning of {column.name}")
+        for value in (column.first, column.last, *ends):
             text(value, "td")
 
 

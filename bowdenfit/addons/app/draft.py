@@ -15,18 +15,15 @@ from bowdenfit.files import FORMATS
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.formats import check_ending
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.describe import describe_measured_files, inspect_files
 from bowdenfit.questions.start.folder import copy_data_set, refuse_existing, refuse_files, write_data_set
-from bowdenfit.questions.start.measured_file import FileColumn, MeasuredFile
-from bowdenfit.units import dimension_of, usual_units
+from bowdenfit.questions.start.measured_file import MeasuredFile
 from bowdenfit.words import printable, shown
 
 _LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
 _FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
-_DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 _MOST_FILES = 300  # of a draft; a judgement: a description names 100 recordings at most
 _MOST_FAULTS, _MOST_CELLS = 40, 12  # refusals beside cells, and cells of such a row; judgements
@@ -50,46 +47,6 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class UnderstoodColumn:
-    """A column of a file as it is understood.
-
-    Args:
-        heading: Heading of the column.
-        unit: Its unit; empty where the file does not say it.
-        meaning: The quantity that it is read as; empty where it is not read.
-        first, last: Text of its first and of its last row.
-        low, high: Its range; empty of words.
-        units: Units that it may have.
-    """
-
-    heading: str
-    unit: str
-    meaning: str
-    first: str
-    last: str
-    low: str
-    high: str
-    units: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class UnderstoodFile:
-    """A file as it is understood.
-
-    Args:
-        name: Its name.
-        holds: Contents in words.
-        columns: Its columns, or the channels of a recording.
-        meanings: Quantities that they may be, with their words.
-    """
-
-    name: str
-    holds: str
-    columns: tuple[UnderstoodColumn, ...]
-    meanings: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
 class Understanding:
     """What is understood of a draft.
 
@@ -102,7 +59,7 @@ class Understanding:
         left_out: Files that the data set will not have, because their contents are not what their extension says.
     """
 
-    files: tuple[UnderstoodFile, ...] = ()
+    files: tuple[MeasuredFile, ...] = ()
     entries: tuple[FormEntry, ...] = ()
     refusals: tuple[Refusal, ...] = ()
     description: str = ""
@@ -208,8 +165,7 @@ class Draft:
             pass
         except BowdenfitError as error:
             refusals = add_cells(list_refusals(error), self.files)
-        files = tuple(map(_understood_file, measured_files))
-        self.understanding = Understanding(files, tuple(form.entries), refusals, description, report)
+        self.understanding = Understanding(tuple(measured_files), tuple(form.entries), refusals, description, report)
         return self.understanding
 
     def _understand_description(self) -> Understanding:
@@ -324,25 +280,3 @@ def _cable_name(measured_files: Sequence[MeasuredFile]) -> str:
     """Return the name that is proposed for the cable: that of its first file."""
     stem = printable(measured_files[0].path.stem.replace("-", " ").replace("_", " "))[:80]
     return stem.strip() or "cable"
-
-
-def _understood_file(file: MeasuredFile) -> UnderstoodFile:
-    """Return a file as it is understood."""
-    questions = file.kind.init_questions if file.kind is not None else None
-    wanted = questions.columns if questions is not None else ()
-    words = {one.name: column.words for column in wanted for one in (column.quantity, *column.also)}
-    if file.kind is not None and not file.kind.takes_channels:
-        words |= {quantity.name: "" for quantity in columns_of_kind(file.kind.name) if quantity.name not in words}
-    meanings = {heading: quantity for quantity, heading in file.assigned.items()}
-    columns = tuple(_understood_column(column, meanings.get(column.name, "")) for column in file.columns)
-    words |= {quantity: "" for quantity in meanings.values() if quantity not in words}
-    return UnderstoodFile(file.name, questions.holds if questions is not None else "", columns, tuple(words.items()))
-
-
-def _understood_column(column: FileColumn, meaning: str) -> UnderstoodColumn:
-    """Return a column as it is understood."""
-    ends = (f"{column.low:.5g}", f"{column.high:.5g}") if column.numbers else ("", "")
-    dimensions = (*([dimension_of(column.unit)] if column.unit else []), *_DIMENSIONS)
-    usual = [unit for name in dimensions for unit in usual_units(name)]
-    units = tuple(dict.fromkeys([*([column.unit] if column.unit else []), *usual]))
-    return UnderstoodColumn(column.name, column.unit, meaning, column.first, column.last, *ends, units)

@@ -1,6 +1,5 @@
 """What `bowdenfit check FILE --join OTHER` says of one recording that two loggers wrote."""
 
-import shlex
 from pathlib import Path
 
 from bowdenfit.dataset import load_folder_or_file
@@ -14,7 +13,6 @@ from bowdenfit.questions.check.single_file import (
     describe_channels,
     describe_commands,
     describe_recorded,
-    with_missing,
 )
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.recording import Recordings
@@ -46,8 +44,7 @@ def describe_joined_files(path: Path, reading: Reading) -> tuple[str, bool]:
         title = f"{file.path.name}: the {end} of a recording ({file.kind}, {counted(len(file.channels), 'channel')})."
         lines += [filled(title), "", *describe_channels(file), ""]
     lines += [*describe_recorded(recordings, obstacle)[1:], ""]
-    options = [f"--join {shlex.quote(str(join))}", *(f"--channel {shlex.quote(channel)}" for channel in channels)]
-    text = " ".join(["bowdenfit fit", shlex.quote(str(path)), "--wrap-angle 180deg", *options])
-    command = with_missing(FitCommand(text, ("180 deg is the wrap angle of the bench",)), missing)
+    command = FitCommand(path, (("--wrap-angle", "180deg"),), ("180 deg is the wrap angle of the bench",))
+    command = command.with_options("--join", [join]).with_options("--channel", channels).with_options("--missing", missing)
     lines += describe_commands([command], not obstacle)
     return "\n".join(lines) + "\n", not obstacle

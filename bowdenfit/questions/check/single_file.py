@@ -1,11 +1,6 @@
 """What `bowdenfit check FILE` says of a file alone: what it is, its columns or channels, and the command that fits it."""
 
-import re
-import shlex
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
-from itertools import pairwise
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
@@ -18,19 +13,10 @@ from bowdenfit.files.apart import limits_times
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
-from bowdenfit.files.missing_codes import MissingCodes
-from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds import KINDS, iterate_tables
-from bowdenfit.kinds.file_kind import FileKind, columns_of_kind, guess_file_kind, is_angle_table
-from bowdenfit.kinds.fit_command import (
-    FitCommand,
-    HeadedColumn,
-    has_own_angles,
-    list_number_columns,
-    make_both_commands,
-    make_recording_command,
-    make_table_command,
-)
+from bowdenfit.kinds.file_kind import columns_of_kind, is_angle_table
+from bowdenfit.kinds.fit_command import FitCommand, make_commands
+from bowdenfit.kinds.lone_file import LoneFile, understand
 from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.questions.check.data_set_words import (
     check_data_set,
@@ -39,12 +25,10 @@ from bowdenfit.questions.check.data_set_words import (
     describe_unusable_readings,
 )
 from bowdenfit.reading import Reading
-from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels
-from bowdenfit.recordings.forces import clock_in_doubt
-from bowdenfit.recordings.named_channels import WANTED, find_channel, parse_channels
+from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table, shown
+from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
 
 _CHOICES = ("noise", "friction", "geometry", "undetected")  # options that the command repeats
 ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
@@ -72,51 +56,51 @@ def describe_single_file(path: Path, reading: Reading) -> tuple[str, bool]:
         BowdenfitError: The file cannot be read, or not with these keywords.
     """
     with limits_times(reading.get("reading_limit") or 1):
-        return _describe_file(path, reading)
+        channels, columns = parse_channels(reading.get("channels", ())), parse_sources(reading.get("columns", ()), "--column")
+        file = understand(path, channels, columns, reading.get("missing", ()))
+        if file.recording is not None:
+            return _describe_recording(file, file.recording, reading)
+        assert file.table is not None
+        if file.kind.other:
+            backwards = _backward_clock(path)
+            return _describe_table(file, make_commands(file), None, backwards, not backwards), False  # `fit` asks which it is
+        if is_angle_table(file.table) and not columns:
+            return _describe_angle_table(file), True
+        return _describe_readings(file, reading)
 
 
-def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
-    """Describe a file that is read within the usual limits."""
-    channels, named = reading.get("channels", ()), parse_sources(reading.get("columns", ()), "--column")
-    file = guess_file_kind(path, bool(channels), tuple(named))
-    if KINDS[file.kind].takes_channels and not file.other:
-        return _describe_recording(path, file, channels, reading.get("missing", ()))
-    raw = MissingCodes(tuple(reading.get("missing", ()))).mark(read_table(path))
-    headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
-    if file.other:
-        backwards = _backward_clock(path)
-        text = describe_table_file(raw, file, make_both_commands(path, raw, file), None, backwards, headings, not backwards)
-        return text, False  # `fit` asks which of the two it is
-    if is_angle_table(raw) and not named:
-        return _describe_angle_table(raw), True
-    command = make_table_command(path, raw, file.kind, named)
-    has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
+def _describe_readings(file: LoneFile, reading: Reading) -> tuple[str, bool]:
+    """Describe a table of readings; and return whether it can be fitted as it stands."""
+    (command,) = make_commands(file)
+    has_angles = file.has_own_angles(is_stated=False)
     strict = any(reading.values()) and not command.names_more
-    angle = None if has_angles or "wrap_angle=" in command.text else ANY_ANGLE
-    data, obstacle = _try_as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle}), strict)
+    names_angle = any(argument.startswith("wrap_angle=") for argument in command.arguments("--column"))
+    stated = {**reading, "wrap_angle": None if has_angles or names_angle else ANY_ANGLE}
+    data, obstacle = _try_as_data_set(file.path, cast(Reading, stated), strict)
     remaining = obstacle
     if obstacle and command.names_more:
-        words = shlex.split(command.text)
-        columns = tuple(word for option, word in pairwise(words) if option == "--column")
-        _, remaining = _try_as_data_set(
-            path, cast(Reading, {**reading, "wrap_angle": angle, "columns": columns}), False
-        )
+        named = {**stated, "columns": command.arguments("--column")}
+        _, remaining = _try_as_data_set(file.path, cast(Reading, named), False)
         obstacle += f"\n{remaining}" if remaining not in obstacle else ""
-    if obstacle and (backwards := _backward_clock(path)):
+    if obstacle and (backwards := _backward_clock(file.path)):
         obstacle, remaining = f"{obstacle}\n{backwards}", backwards
-    return describe_table_file(
-        raw, file, [_with_settings(command, reading)], data, obstacle, headings, not remaining
-    ), not obstacle
+    command = command.with_options("--set", reading.get("settings", ()))
+    for name in _CHOICES:
+        command = command.with_options(f"--{name}", [value] if (value := reading.get(name)) else [])
+    command = command.with_options("--missing", reading.get("missing", ()))
+    return _describe_table(file, [command], data, obstacle, not remaining), not obstacle
 
 
-def _describe_angle_table(raw: RawTable) -> str:
+def _describe_angle_table(file: LoneFile) -> str:
     """Describe a table of wrap angles by length, and where it belongs."""
+    assert file.table is not None
     place = (
         "It is fitted together with readings of forces or efficiencies, or recordings, at some of these lengths: name it in "
-        f'cable.toml, [tables] angles = {{ file = "{raw.file}" }}; bowdenfit init writes that file.'
+        f'cable.toml, [tables] angles = {{ file = "{file.path.name}" }}; bowdenfit init writes that file.'
     )
-    lines = [f"{raw.file}: a table of wrap angles at {counted(len(raw.rows), 'length')}.", "", _column_table(raw, (), {})]
-    return "\n".join([*lines, "", *describe_row_account(raw.lines), "", filled(place)]) + "\n"
+    title = f"{file.path.name}: a table of wrap angles at {counted(len(file.table.rows), 'length')}."
+    lines = [title, "", _column_table(file, ()), "", *describe_row_account(file.table.lines), "", filled(place)]
+    return "\n".join(lines) + "\n"
 
 
 def _try_as_data_set(path: Path, reading: Reading, strict: bool) -> tuple[Dataset | None, str]:
@@ -133,29 +117,26 @@ def _try_as_data_set(path: Path, reading: Reading, strict: bool) -> tuple[Datase
         return None, str(error)
 
 
-def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
-    """Return the command with what the user has set besides columns."""
-    stated = [f"--set {shlex.quote(setting)}" for setting in reading.get("settings", ())]
-    stated += [f"--{name} {value}" for name in _CHOICES if (value := reading.get(name))]
-    return with_missing(replace(command, text=" ".join([command.text, *stated])), reading.get("missing", ()))
-
-
-def with_missing(command: FitCommand, codes: Sequence[str]) -> FitCommand:
-    """Return the command with the missing-value codes."""
-    return replace(command, text=" ".join([command.text, *(f"--missing {shlex.quote(code)}" for code in codes)]))
-
-
-def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str], missing: Sequence[str]) -> tuple[str, bool]:
+def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading) -> tuple[str, bool]:
     """Describe a recording alone; and return whether it can be fitted as it stands."""
-    file, notes = MissingCodes(tuple(missing)).blank_samples(read_channels(path))
-    file = replace(file, remarks=(*file.remarks, *notes))
-    angle = _measured_angle(file, channels)
-    recordings, obstacle = _read_recording(file, channels, angle, missing)
-    backwards = describe_backward_clock(file) if obstacle and "backwards" not in obstacle else ""
+    (command,) = make_commands(file)
+    missing = reading.get("missing", ())
+    stated, recordings, obstacle = ANY_ANGLE if file.angle is None else (file.angle.angle, "rad"), None, ""
+    try:
+        data = single_file_dataset(file.path, stated, (), file.named, kind="recordings", missing=missing)
+        recordings = data.measurements.table(Recordings)
+    except DatasetError as error:
+        obstacle = str(error)
+    backwards = describe_backward_clock(recording) if obstacle and "backwards" not in obstacle else ""
     obstacle = "\n".join(filter(None, [obstacle, backwards]))
-    command = with_missing(_recording_command(path, file, channels, angle), missing)
-    usable = not obstacle or (not channels and "--channel" in command.text and not backwards)
-    return describe_recording_file(file, kind.why, command, recordings, obstacle, usable), not obstacle
+    usable = not obstacle or (not file.named and bool(command.arguments("--channel")) and not backwards)
+    description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
+    source = f"({recording.kind}, {counted(len(recording.channels), 'channel')})"
+    lines = [filled(f"{file.path.name}: {description}, because {file.kind.why} {source}."), ""]
+    lines += [*describe_channels(recording), *describe_recorded(recordings, obstacle), ""]
+    lines += describe_commands([command.with_options("--missing", missing)], usable)
+    lines += ["Several recordings of one cable go into a cable.toml (bowdenfit init)."]
+    return "\n".join(lines) + "\n", not obstacle
 
 
 def describe_backward_clock(file: ChannelFile) -> str:
@@ -177,79 +158,26 @@ def _backward_clock(path: Path) -> str:
     return describe_backward_clock(file) if long else ""
 
 
-def _measured_angle(file: ChannelFile, channels: Sequence[str]) -> AngleChannel | None:
-    """Return the channel that says at which wrap angle a recording was made, with the force at the input looked for by name."""
-    sources = parse_channels(channels)
-    with suppress(DatasetError):
-        force = find_channel(file, WANTED[0], sources)
-        return next(iter(find_angle_channels(file, sources, np.zeros(0) if force is None else force.values)), None)
-    return None
-
-
-def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str], angle: AngleChannel | None) -> FitCommand:
-    """Return the command that fits a recording."""
-    signals = [channel for channel in file.channels if not is_clock(channel) and not (angle and channel.name == angle.name)]
-    headed = [
-        HeadedColumn(signal.name, signal.unit, float(signal.values[signal.values == signal.values].mean()))
-        for signal in signals
-    ]
-    has_clock = any(signal.time is not None for signal in signals)
-    in_doubt = [clock.name for signal in signals if (clock := clock_in_doubt(file, signal)) is not None]
-    stated = (angle.option, f"the channel {shown(angle.name)}") if angle else None
-    return make_recording_command(
-        path, headed, has_clock, parse_channels(channels), doubtful_clock="".join(in_doubt[:1]), angle=stated
-    )
-
-
-def _read_recording(
-    file: ChannelFile, channels: Sequence[str] = (), angle: AngleChannel | None = None, missing: Sequence[str] = ()
-) -> tuple[Recordings | None, str]:
-    """Read the recording that the channels of a file make, prepared and cut into strokes.
-
-    Args:
-        file: The channels.
-        channels: Which channel is what, such as "input_force=ai0:lbf".
-        angle: The channel that says at which wrap angle it was made.
-        missing: Missing-value codes.
-
-    Returns:
-        The recording, None where they make none; and why not, in a sentence.
-    """
-    stated = ANY_ANGLE if angle is None else (angle.angle, "rad")
-    try:
-        data = single_file_dataset(file.path, stated, (), parse_channels(channels), kind="recordings", missing=missing)
-    except DatasetError as error:
-        return None, str(error)
-    return data.measurements.table(Recordings), ""
-
-
-def describe_table_file(
-    raw: RawTable,
-    file: FileKind,
-    commands: Sequence[FitCommand],
-    data: Dataset | None,
-    obstacle: str,
-    named: Mapping[str, str],
-    usable: bool = True,
+def _describe_table(
+    file: LoneFile, commands: Sequence[FitCommand], data: Dataset | None, obstacle: str, usable: bool = True
 ) -> str:
     """Describe a table and how to fit it.
 
     Args:
-        raw: The file as read.
-        file: Its detected kind.
+        file: The table.
         commands: Commands that fit it; two where it could be either of two kinds.
         data: The data set that it makes; None if it makes none yet.
         obstacle: Reason why it cannot be fitted, in a sentence.
-        named: Quantities whose columns the user has named, by heading.
         usable: Whether the command can fit it as it stands.
     """
-    title = f"{raw.file}: {_kind_in_words(raw, data)}, because {file.why}."
-    if file.other:
-        title = f"{raw.file}: a table of readings or a recording; {file.why}."
-    lines = [filled(title), "", _column_table(raw, columns_of_kind(file.kind), named)]
+    assert file.table is not None
+    title = f"{file.path.name}: {_kind_in_words(len(file.table.rows), data)}, because {file.kind.why}."
+    if file.kind.other:
+        title = f"{file.path.name}: a table of readings or a recording; {file.kind.why}."
+    lines = [filled(title), "", _column_table(file, columns_of_kind(file.kind.kind))]
     if data is not None:
         lines += ["", *describe_first_and_last_rows(data)]
-    account = data.accounts[0] if data is not None else raw.lines
+    account = data.accounts[0] if data is not None else file.table.lines
     lines += ["", *describe_row_account(account)]
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in account.remarks]
@@ -268,74 +196,47 @@ def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> li
     """
     lines, when = list[str](), "" if usable else " once that is corrected"
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
-        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", wrap_command(command.text)]
+        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", wrap_command(command)]
         granted = listed([f"that {assumption}" for assumption in command.provided])
         lines += [filled(f"This assumes {granted}; change what is wrong.")] if granted else []
     return lines
 
 
-def wrap_command(command: str) -> str:
+def wrap_command(command: FitCommand) -> str:
     """Wrap a command that can be pasted into lines that fit into a terminal, where its options let it."""
-    lines = ["  "]
-    for i, part in enumerate(re.split(r" (?=--)", command)):
-        if i and len(lines[-1]) + len(part) + 3 > WIDTH:
+    first, *options = command.parts
+    lines = [f"  {first}"]
+    for option in options:
+        if len(lines[-1]) + len(option) + 3 > WIDTH:
             lines[-1] += " \\"
-            lines.append(f"    {part}")
+            lines.append(f"    {option}")
         else:
-            lines[-1] += f" {part}" if i else part
+            lines[-1] += f" {option}"
     return "\n".join(lines)
 
 
-def _kind_in_words(raw: RawTable, data: Dataset | None) -> str:
+def _kind_in_words(rows: int, data: Dataset | None) -> str:
     """Return what a table is called: by its kind, or by its number of rows."""
     for kind, table in iterate_tables(data.measurements) if data else ():
         return kind.describe_single_file(table)
-    return f"a table of {counted(len(raw.rows), 'row')}"
+    return f"a table of {counted(rows, 'row')}"
 
 
-def _column_table(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:
+def _column_table(file: LoneFile, wanted: tuple[Quantity, ...]) -> str:
     """Return the columns: unit, what they are read as, and range; of very many the first, and all that are read."""
-    can_be = find_candidates(list(zip(raw.header, raw.units, strict=True)), wanted, tuple(named.values()))
-    read_as = dict(named)
-    for quantity, columns in can_be.items():
+    read_as = dict(file.stated_headings)
+    for quantity, columns in find_candidates(file.headings, wanted, tuple(read_as.values())).items():
         for candidate in columns:
-            read_as[raw.header[candidate.position]] = quantity if len(columns) == 1 else f"{quantity}?"
-    numbers = {candidate.name: candidate for candidate in list_number_columns(raw)}
+            read_as[file.headings[candidate.position][0]] = quantity if len(columns) == 1 else f"{quantity}?"
     rows = []
-    for heading, below in zip(raw.header, raw.units, strict=True):
-        if heading:
-            column = numbers.get(heading)
-            spread = [f"{column.low:.5g}", f"{column.high:.5g}"] if column else ["", ""]
-            rows.append([heading, heading_of(heading, below).unit or "-", read_as.get(heading, "-"), *spread])
+    for column in file.columns:
+        spread = [f"{column.low:.5g}", f"{column.high:.5g}"] if column.numbers else ["", ""]
+        unit = heading_of(column.name, column.below).unit or "-"
+        rows.append([column.name, unit, read_as.get(column.name, "-"), *spread])
     listed_rows = [row for i, row in enumerate(rows) if i < _MAX_LISTED or row[0] in read_as]
     listing = narrow_table(["column", "unit", "read as", "lowest", "highest"], listed_rows, left=_LEFT)
     more = len(rows) - len(listed_rows)
     return f"{listing}\n... and {more} more columns." if more else listing
-
-
-def describe_recording_file(
-    file: ChannelFile,
-    reason: str,
-    command: FitCommand,
-    recordings: Recordings | None = None,
-    obstacle: str = "",
-    usable: bool = True,
-) -> str:
-    """Describe the channels of a file, one a line, and the recording that they make.
-
-    Args:
-        file: Channels of the file.
-        reason: Why it is taken for a recording, as a clause.
-        command: The command that fits it.
-        recordings: The file as a recording, where its channels say which is which.
-        obstacle: Reason why it is not one, in a sentence.
-        usable: Whether the command can fit it as it stands.
-    """
-    description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
-    title = f"{file.path.name}: {description}, because {reason} ({file.kind}, {counted(len(file.channels), 'channel')})."
-    lines = [filled(title), "", *describe_channels(file), *describe_recorded(recordings, obstacle)]
-    several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
-    return "\n".join([*lines, "", *describe_commands([command], usable), several]) + "\n"
 
 
 def describe_recorded(recordings: Recordings | None, obstacle: str) -> list[str]:

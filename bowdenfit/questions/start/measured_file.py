@@ -3,83 +3,25 @@
 Headings and units say most of that; `name_columns` asks for the rest.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import read_channels
-from bowdenfit.files.clocks import is_clock, names_time
-from bowdenfit.files.headings import Quantity, find_candidates, heading_of, plain_name, split_brackets
-from bowdenfit.files.spellings import parse_heading
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.headings import Quantity, find_candidates
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.file_kind import FORCES, FileKind, guess_file_kind
-from bowdenfit.kinds.fit_command import list_number_columns
+from bowdenfit.kinds.file_kind import FORCES, columns_of_kind
 from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.lone_file import FileColumn, LoneFile, understand, understand_recording
 from bowdenfit.kinds.table_files import WantedColumn
 from bowdenfit.questions.start.question import Asker, choice_question, number_question, unit_question, yes_no_question
-from bowdenfit.units import ColumnSource, dimension_of, is_unit
+from bowdenfit.units import ColumnSource
 from bowdenfit.words import quoted, shown
 
 _MAX_LABEL_SHARE = (
     0.8  # most labels per row of a column of runs or strokes; a judgement: most labels stand in several rows
 )
-
-
-@dataclass(frozen=True)
-class FileColumn:
-    """A column, or a channel of a recording.
-
-    Args:
-        name: Its heading.
-        below: The unit that stands elsewhere than in the heading; empty without one.
-        unit: Its unit; empty where the file does not say it.
-        numbers: Whether it holds numbers.
-        low, high: Lowest and highest of these.
-        values: Number of different values in it.
-        blanks: Number of blank cells.
-        first, last: Text of its first and of its last row.
-    """
-
-    name: str
-    below: str
-    unit: str
-    numbers: bool
-    low: float = 0.0
-    high: float = 0.0
-    values: int = 0
-    blanks: int = 0
-    first: str = ""
-    last: str = ""
-
-    @property
-    def dimension(self) -> str:
-        """What its unit measures; empty without one."""
-        return dimension_of(self.unit) if self.unit else ""
-
-    @property
-    def words(self) -> str:
-        """Its heading and what it holds."""
-        unit = f" {self.unit}" if self.unit else ", no unit"
-        holds = f"{self.low:.5g} to {self.high:.5g}{unit}" if self.numbers else "words"
-        return f"{shown(self.name)} ({holds})"
-
-    @property
-    def plain_name(self) -> str:
-        """Its name as tables have it, without its unit: "Sheath angle (deg)" is sheath_angle."""
-        name = split_brackets(self.name)[0]
-        name = re.sub(rf"[\s_]+{re.escape(self.unit)}$", "", name) if self.unit else name
-        return plain_name(name) or plain_name(self.name) or "column"
-
-    @property
-    def source(self) -> ColumnSource:
-        """The column as a description names it."""
-        return ColumnSource(name=self.name, unit=self.unit or None)
 
 
 @dataclass
@@ -112,6 +54,24 @@ class MeasuredFile:
     def name(self) -> str:
         """Its name."""
         return self.path.name
+
+    @property
+    def holds(self) -> str:
+        """Its contents in words; empty where its kind is open."""
+        return self.kind.init_questions.holds if self.kind and self.kind.init_questions else ""
+
+    @property
+    def meanings(self) -> dict[str, str]:
+        """Quantities that its columns may be, with their words."""
+        wanted = self.kind.init_questions.columns if self.kind and self.kind.init_questions else ()
+        words = {quantity.name: column.words for column in wanted for quantity in (column.quantity, *column.also)}
+        has_table = self.kind is not None and not self.kind.takes_channels
+        more = [quantity.name for quantity in columns_of_kind(self.kind.name)] if self.kind and has_table else []
+        return words | {name: "" for name in (*more, *self.assigned) if name not in words}
+
+    def meaning_of(self, column: FileColumn) -> str:
+        """Return the quantity that a column is read as; empty where it is not used."""
+        return next((quantity for quantity, heading in self.assigned.items() if heading == column.name), "")
 
     @property
     def unknown_columns(self) -> list[FileColumn]:
@@ -163,7 +123,7 @@ class MeasuredFile:
 
 
 def inspect_file(path: Path) -> MeasuredFile:
-    """Inspect a file: its kind and columns.
+    """Inspect a file: its columns, and the kind that their headings and units say.
 
     Args:
         path: The file.
@@ -171,10 +131,15 @@ def inspect_file(path: Path) -> MeasuredFile:
     Raises:
         DatasetError: It cannot be read.
     """
-    detected = guess_file_kind(path)
-    if not detected.other and KINDS[detected.kind].takes_channels:
-        return inspect_recording(path, detected.why)
-    return _inspect_table(path, detected)
+    lone = understand(path)
+    if lone.recording is not None:
+        return _open_recording(lone)
+    file = MeasuredFile(path, lone.signals, None, lone.kind.why)
+    fitting = _fitting_kinds(file)
+    matching = [kind for kind in fitting if kind.name == lone.kind.kind] or fitting
+    file.kind = matching[0] if len(matching) == 1 and not lone.kind.other else None
+    file.likely = matching[0] if matching else _likely_kind(file)
+    return file
 
 
 def inspect_recording(path: Path, why: str) -> MeasuredFile:
@@ -183,53 +148,12 @@ def inspect_recording(path: Path, why: str) -> MeasuredFile:
     Raises:
         DatasetError: It cannot be read.
     """
-    file = read_channels(path)
-    signals = [channel for channel in file.channels if not is_clock(channel)]
-    columns = tuple(
-        FileColumn(
-            channel.name,
-            channel.unit,
-            channel.unit or heading_of(channel.name).unit,
-            True,
-            *_measure_range(channel.values),
-            len(channel.values),
-            first="".join(f"{value:.5g}" for value in channel.values[:1]),
-            last="".join(f"{value:.5g}" for value in channel.values[-1:]),
-        )
-        for channel in signals
-    )
-    kind = next(kind for kind in KINDS.values() if kind.takes_channels)
-    return MeasuredFile(path, columns, kind, why, has_clock=any(channel.time is not None for channel in signals))
+    return _open_recording(understand_recording(path, why))
 
 
-def _measure_range(values: np.ndarray) -> tuple[float, float]:
-    """Return the lowest and highest finite value; zeros where there is none."""
-    finite = values[np.isfinite(values)]
-    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
-
-
-def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
-    """Inspect a table: its columns, and the kind that their headings and units say."""
-    table = read_table(path)
-    number_columns = {column.name: column for column in list_number_columns(table)}
-    columns = []
-    for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
-        if not heading or (names_time(heading) and not parse_heading(heading, below)):
-            continue
-        cells = [row[i] for row in table.rows]
-        numbers, other = number_columns.get(heading), parse_heading(heading, below)
-        unit = (other.unit if other else "") or heading_of(heading, below).unit
-        spread = (numbers.low, numbers.high) if numbers else (0.0, 0.0)
-        different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
-        unit = unit if unit and is_unit(unit) else ""
-        ends = [" ".join(cell.text.split()) for cell in (cells[0], cells[-1])] if cells else ["", ""]
-        columns.append(FileColumn(heading, below, unit, numbers is not None, *spread, different, blanks, *ends))
-    file = MeasuredFile(path, tuple(columns), None, detected.why)
-    fitting = _fitting_kinds(file)
-    matching = [kind for kind in fitting if kind.name == detected.kind] or fitting
-    file.kind = matching[0] if len(matching) == 1 and not detected.other else None
-    file.likely = matching[0] if matching else _likely_kind(file)
-    return file
+def _open_recording(lone: LoneFile) -> MeasuredFile:
+    """Return a recording of which nothing is assigned yet."""
+    return MeasuredFile(lone.path, lone.signals, KINDS[lone.kind.kind], lone.kind.why, has_clock=lone.has_clock)
 
 
 def _fitting_kinds(file: MeasuredFile) -> list[Kind[Any]]:
@@ -351,11 +275,11 @@ def _ask_required_column(
 
 def _ask_optional_column(file: MeasuredFile, wanted: WantedColumn, asker: Asker) -> FileColumn | None:
     """Return a column of labels that may be there, as answered; None without one."""
-    rows = max((column.values for column in file.columns), default=0)
+    rows = max((column.different for column in file.columns), default=0)
     options = [
         column
         for column in file.unknown_columns
-        if not column.unit and 1 < column.values <= max(_MAX_LABEL_SHARE * rows, 2) and _holds_labels(column, wanted)
+        if not column.unit and 1 < column.different <= max(_MAX_LABEL_SHARE * rows, 2) and _holds_labels(column, wanted)
     ]
     if not options:
         return None

@@ -59,7 +59,7 @@ def test_an_answer_that_cannot_be_read_is_refused_in_the_words_of_the_terminal()
 def test_a_draft_is_understood_as_init_understands_it(draft_of, tmp_path):
     draft = draft_of(forces=TABLE)
     initial = draft.understand()
-    assert [column.meaning for column in initial.files[0].columns] == ["input_force", "output_force", "run"]
+    assert list(map(initial.files[0].meaning_of, initial.files[0].columns)) == ["input_force", "output_force", "run"]
     assert (initial.files[0].columns[1].first, initial.files[0].columns[1].last) == ("15.2", "29.9")
     assert initial.report == initial.description == ""
     after = answer(draft, "By which angle", "180 deg")
@@ -81,7 +81,8 @@ def test_meaning_and_unit_of_a_column_can_be_stated(draft_of):
     understanding = draft.understand()
     if understanding.entries[0].words.startswith("forces.csv has the columns"):
         understanding = answer(draft, "forces.csv has the columns", "2")
-    assert {column.heading: (column.meaning, column.unit) for column in understanding.files[0].columns} == {
+    (file,) = understanding.files
+    assert {column.name: (file.meaning_of(column), column.unit) for column in file.columns} == {
         "a": ("input_force", "lbf"), "b": ("output_force", "lbf"), "bend": ("wrap_angle", "deg"), "trial": ("", ""),
     }  # fmt: skip
 

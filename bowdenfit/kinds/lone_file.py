@@ -1,0 +1,314 @@
+"""What is understood of a file without a description: its kind, its columns with their numbers, and what it states.
+
+`understand` is the one place that looks at such a file: `check` shows the result, `fit` reads by it (`kinds/fit_command.py`
+makes the command), and `init` and the app ask for what it leaves open.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files import read_channels
+from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.clocks import is_clock, names_time
+from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming, plain_name, split_brackets
+from bowdenfit.files.layout import is_index
+from bowdenfit.files.missing_codes import MissingCodes
+from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, parse_heading
+from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.file_kind import HEAD, FileKind, guess_file_kind, read_numbers
+from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels
+from bowdenfit.recordings.forces import clock_in_doubt
+from bowdenfit.recordings.named_channels import WANTED, find_channel
+from bowdenfit.types import Vector
+from bowdenfit.units import ColumnSource, dimension_of, is_unit
+from bowdenfit.words import shown
+
+WRAP_ANGLE = Quantity("wrap_angle", "angle")
+_FEW = 20  # rows up to which 1, 2, 3 may be loads as well as an index; a judgement
+
+
+@dataclass(frozen=True, eq=False)
+class FileColumn:
+    """A column of a table, or a channel of a recording.
+
+    Args:
+        name: Its heading.
+        below: Unit that the file gives elsewhere than in the heading; empty without one.
+        unit: Its unit; empty where the file states none that is known.
+        values: Its numbers as written, one per row; NaN where there is none.
+        numbers: Whether it holds numbers; a clock of a table does not count.
+        is_clock: Whether it says when the others were read.
+        different: Number of different values in it.
+        blanks: Number of blank cells.
+        first, last: Text of its first and of its last row.
+    """
+
+    name: str
+    below: str
+    unit: str
+    values: Vector
+    numbers: bool
+    is_clock: bool
+    different: int = 0
+    blanks: int = 0
+    first: str = ""
+    last: str = ""
+
+    @cached_property
+    def finite(self) -> Vector:
+        """Its finite values."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
+    def low(self) -> float:
+        """Lowest of its numbers; 0 where it holds none."""
+        return float(self.finite.min()) if self.numbers and len(self.finite) else 0.0
+
+    @property
+    def high(self) -> float:
+        """Highest of its numbers; 0 where it holds none."""
+        return float(self.finite.max()) if self.numbers and len(self.finite) else 0.0
+
+    @property
+    def mean(self) -> float:
+        """Mean of its numbers; 0 where it holds none."""
+        return float(self.finite.mean()) if len(self.finite) else 0.0
+
+    @property
+    def are_whole(self) -> bool:
+        """Whether its numbers are whole."""
+        return bool(np.all(self.finite == np.round(self.finite)))
+
+    @property
+    def is_index(self) -> bool:
+        """Whether it only counts the rows."""
+        return len(self.finite) > _FEW and is_index(self.finite)
+
+    @property
+    def written_unit(self) -> str:
+        """The unit as the file has it, whether it is known or not; empty without one."""
+        other = parse_heading(self.name, self.below)
+        return (other.unit if other else "") or heading_of(self.name, self.below).unit
+
+    @property
+    def dimension(self) -> str:
+        """What its unit measures; empty without one."""
+        return dimension_of(self.unit) if self.unit else ""
+
+    @property
+    def words(self) -> str:
+        """Its heading and what it holds."""
+        unit = f" {self.unit}" if self.unit else ", no unit"
+        holds = f"{self.low:.5g} to {self.high:.5g}{unit}" if self.numbers else "words"
+        return f"{shown(self.name)} ({holds})"
+
+    @property
+    def plain_name(self) -> str:
+        """Its name as tables have it, without its unit: "Sheath angle (deg)" is sheath_angle."""
+        name = split_brackets(self.name)[0]
+        name = re.sub(rf"[\s_]+{re.escape(self.unit)}$", "", name) if self.unit else name
+        return plain_name(name) or plain_name(self.name) or "column"
+
+    @property
+    def source(self) -> ColumnSource:
+        """The column as a description names it."""
+        return ColumnSource(name=self.name, unit=self.unit or None)
+
+
+@dataclass(frozen=True)
+class LoneFile:
+    """A file without a description, as it is understood.
+
+    Args:
+        path: Where it is.
+        kind: The kind of measurement that it holds, and why.
+        columns: Its columns or channels, without those that have no heading.
+        named: Columns or channels that the user names, by quantity.
+        table: Its rows; None for a recording.
+        recording: Its channels; None for a table.
+        angle: The channel that says at which wrap angle it was recorded; None without one.
+    """
+
+    path: Path
+    kind: FileKind
+    columns: tuple[FileColumn, ...] = ()
+    named: Mapping[str, ColumnSource] = field(default_factory=dict)
+    table: RawTable | None = None
+    recording: ChannelFile | None = None
+    angle: AngleChannel | None = None
+
+    @property
+    def signals(self) -> tuple[FileColumn, ...]:
+        """Its columns but for clocks."""
+        return tuple(column for column in self.columns if not column.is_clock)
+
+    @property
+    def numbers(self) -> tuple[FileColumn, ...]:
+        """Its columns of numbers but for clocks."""
+        return tuple(column for column in self.columns if column.numbers and not column.is_clock)
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether it says when its rows were read."""
+        if self.recording is None:
+            return any(names_time(column.name) for column in self.columns)
+        return any(channel.time is not None for channel in self.recording.channels if not is_clock(channel))
+
+    @property
+    def doubtful_clock(self) -> str:
+        """Name of a clock that states no unit and is unlikely to be in seconds; empty without one."""
+        channels = self.recording.channels if self.recording else ()
+        doubtful = [clock_in_doubt(self.recording, channel) for channel in channels if self.recording and not is_clock(channel)]
+        return next((clock.name for clock in doubtful if clock), "")
+
+    @property
+    def headings(self) -> list[tuple[str, str]]:
+        """The headings of a table with the units that the file gives elsewhere; empty for a recording."""
+        return list(zip(self.table.header, self.table.units, strict=True)) if self.table else []
+
+    @property
+    def stated_headings(self) -> dict[str, str]:
+        """Quantities of the columns that the user names, by heading."""
+        return {source.name: quantity.rpartition(".")[2] for quantity, source in self.named.items()}
+
+    @property
+    def likely_wrap_angles(self) -> dict[str, str | None]:
+        """Columns of numbers that are likely wrap angles, with the unit to state; empty where the heading has it.
+
+        A column without a unit is taken to be in rad where its values are none of degrees: whole turns at most, not all whole.
+        Small whole numbers count bends, and have None. With the same number in every row it may be a count or a label.
+        """
+        likely = dict[str, str | None]()
+        for column in self.numbers:
+            spelling = likely_wrap_angle(column.name, column.below)
+            if spelling is not None and (column.high > column.low or (spelling.unit and column.high > 0)):
+                unwritten = likely_angle_unit(column.name, column.high, column.are_whole) or None
+                likely[column.name] = "" if spelling.unit else unwritten
+        return likely
+
+    @property
+    def wrap_angle_heading(self) -> str:
+        """Heading of the column that states the wrap angle of each row; empty without one."""
+        columns = find_candidates(self.headings, (WRAP_ANGLE,))[WRAP_ANGLE.name]
+        return self.headings[columns[0].position][0] if columns else ""
+
+    def has_own_angles(self, is_stated: bool) -> bool:
+        """Return whether its rows have wrap angles of their own.
+
+        Args:
+            is_stated: Whether the user states one angle for all rows.
+
+        Raises:
+            DatasetError: They have, although one is stated.
+        """
+        if self.table is None:
+            return False
+        heading = self.wrap_angle_heading
+        if not heading and WRAP_ANGLE.name not in self.named:
+            if is_stated:
+                self._refuse_passed_over()
+            return False
+        if is_stated:
+            what = f"has a column of wrap angles, {shown(heading)}" if heading else "is to have one"
+            raise DatasetError(
+                f"{self.path.name} {what}, and --wrap-angle states one angle for all rows; leave one of the two out."
+            )
+        return True
+
+    def _refuse_passed_over(self) -> None:
+        """Refuse one angle for all rows of a table in which a column is likely to hold their wrap angles.
+
+        Raises:
+            DatasetError: There is such a column.
+        """
+        for name, unit in self.likely_wrap_angles.items():
+            if unit is None:
+                raise DatasetError(
+                    f"{self.path.name} has a column {shown(name)}, which is likely to count the bends of each row, and "
+                    "--wrap-angle states one angle for all rows. Write the wrap angle into a column of its own, headed "
+                    f"wrap_angle_deg: the number in {shown(name)} times the angle of one bend. If it counts something else, "
+                    "take it out of the file."
+                )
+            raise DatasetError(
+                f"{self.path.name} has a column {shown(name)}, which is likely to hold the wrap angle of each row, and "
+                f"--wrap-angle states one angle for all rows. Name it instead: {option_naming('wrap_angle', name, unit)}; if "
+                "it is another angle, take the column out of the file."
+            )
+
+
+def understand(
+    path: Path,
+    channels: Mapping[str, ColumnSource] | None = None,
+    columns: Mapping[str, ColumnSource] | None = None,
+    missing: Sequence[float | str] = (),
+    is_whole: bool = True,
+) -> LoneFile:
+    """Return what is understood of a file without a description.
+
+    Args:
+        path: The file.
+        channels: Channels of a recording that the user names, by quantity.
+        columns: Columns of a table, likewise.
+        missing: Missing-value codes.
+        is_whole: Whether all of it is read; else the first rows of a table, and of a recording its kind alone.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    kind = guess_file_kind(path, bool(channels), tuple(columns or ()))
+    if KINDS[kind.kind].takes_channels and not kind.other:
+        if is_whole:
+            return understand_recording(path, kind.why, channels, missing)
+        return LoneFile(path, kind, named=channels or {})
+    table = MissingCodes(tuple(missing)).mark(read_table(path, None if is_whole else HEAD))
+    return LoneFile(path, kind, _columns_of_table(table), columns or {}, table)
+
+
+def understand_recording(
+    path: Path, why: str, channels: Mapping[str, ColumnSource] | None = None, missing: Sequence[float | str] = ()
+) -> LoneFile:
+    """Return what is understood of a file that is a recording, for the reason given as a clause.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    file, notes = MissingCodes(tuple(missing)).blank_samples(read_channels(path))
+    file, angle, sources = replace(file, remarks=(*file.remarks, *notes)), None, channels or {}
+    with suppress(DatasetError):
+        force = find_channel(file, WANTED[0], sources)
+        angle = next(iter(find_angle_channels(file, sources, np.zeros(0) if force is None else force.values)), None)
+    kind = next(kind.name for kind in KINDS.values() if kind.takes_channels)
+    return LoneFile(path, FileKind(kind, why), tuple(map(_column_of_channel, file.channels)), sources, None, file, angle)
+
+
+def _columns_of_table(table: RawTable) -> tuple[FileColumn, ...]:
+    """Return the columns of a table that have a heading."""
+    columns = []
+    for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
+        if not heading:
+            continue
+        cells, values = [row[i] for row in table.rows], np.array(read_numbers(table, i))
+        other = parse_heading(heading, below)
+        is_time, unit = names_time(heading) and not other, (other.unit if other else "") or heading_of(heading, below).unit
+        are_numbers = not is_time and 2 * np.count_nonzero(np.isfinite(values)) > len(cells)
+        ends = [" ".join(cell.text.split()) for cell in (cells[0], cells[-1])] if cells else ["", ""]
+        different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
+        known = unit if unit and is_unit(unit) else ""
+        columns.append(FileColumn(heading, below, known, values, bool(are_numbers), is_time, different, blanks, *ends))
+    return tuple(columns)
+
+
+def _column_of_channel(channel: Channel) -> FileColumn:
+    """Return a channel as a column."""
+    unit = channel.unit or heading_of(channel.name).unit
+    ends = ["".join(f"{value:.5g}" for value in part) for part in (channel.values[:1], channel.values[-1:])]
+    different = len(channel.values)
+    return FileColumn(channel.name, channel.unit, unit, channel.values, True, is_clock(channel), different, 0, *ends)

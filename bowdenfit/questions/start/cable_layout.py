@@ -5,11 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from bowdenfit.cable.registry import CURVES
+from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.files.headings import Quantity
 from bowdenfit.files.spellings import without_accents
 from bowdenfit.kinds.file_kind import find_stated_angle
+from bowdenfit.questions.start.curve_choice import NO_FAMILY, propose_curve
 from bowdenfit.questions.start.measured_file import (
     FileColumn,
     MeasuredFile,
@@ -28,11 +32,11 @@ from bowdenfit.questions.start.question import (
     word_question,
     yes_no_question,
 )
+from bowdenfit.units import conversion_factor
 from bowdenfit.words import listed, quoted, shown
 
 _WRAP_ANGLE, _LENGTH = "wrap_angle", "cable_length"  # columns of tables where headings give no name of their own
 _LENGTH_WORDS = re.compile(r"length|lange|laenge|longueur|longitud|lunghezza")  # in headings, of five languages
-_DEFAULT_CURVE = "gaussian"  # proposed first: what a joint makes of a cable beside it (docs/formats.md)
 _ANGLE_WORDS = re.compile(
     r"\b(?:wrap|bend|angles?|winkel|umschlingungswinkel|biegewinkel|angulo|angolo)\b|_", re.IGNORECASE
 )
@@ -118,7 +122,7 @@ def _add_route(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:
     if bought := asker.ask(_choices_question(ends, column.unit)):
         layout.route["choices"] = list(bought)
     assign_column(file, layout.length_quantity, column, asker)
-    _add_curved_contacts(file, layout, asker)
+    _add_curved_contacts(file, column, layout, asker)
 
 
 def _range_question(column: FileColumn) -> Question[tuple[float, ...]]:
@@ -152,7 +156,21 @@ def _choices_question(ends: Sequence[float], unit: str) -> Question[tuple[float,
     return Question(question.words, read, "-")
 
 
-def _add_curved_contacts(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:
+def _ask_curve(layout: CableLayout, length: FileColumn, angle: FileColumn, asker: Asker) -> str:
+    """Return the curve that an angle follows along the length, as answered."""
+    shape = (
+        "How does that angle follow the length: gaussian (a bell, largest at some length), line (a straight line), "
+        "logistic (from 0 to a plateau) or smooth (no known curve)? bowdenfit compare says whether another fits better."
+    )
+    route = Route(variable=layout.route["variable"], unit=layout.route["unit"], range=tuple(layout.route["range"]))
+    has_length, radians = np.isfinite(length.values), conversion_factor(angle.unit, "angle", "rad")
+    proposed = propose_curve(route, length.values[has_length], radians * angle.values[has_length])
+    if proposed == NO_FAMILY:
+        asker.say(f"Another curve than a bell predicts each angle of {shown(angle.name)} better from the rest.")
+    return asker.ask(word_question(shape, sorted(CURVES), proposed))
+
+
+def _add_curved_contacts(file: MeasuredFile, length: FileColumn, layout: CableLayout, asker: Asker) -> None:
     """Add a contact for every column of wrap angles along the route."""
     angles = unknown_columns_of(file, "angle")
     if not angles:
@@ -169,11 +187,7 @@ def _add_curved_contacts(file: MeasuredFile, layout: CableLayout, asker: Asker) 
         name = _ask_name(
             layout, f"What is the place called whose wrap angle is {shown(column.name)}?", _propose_name(column), asker
         )
-        shape = (
-            "How does that angle follow the length: gaussian (a bell, largest at some length), line (a straight line), "
-            "logistic (from 0 to a plateau) or smooth (no known curve)? bowdenfit compare says whether another fits better."
-        )
-        curve = asker.ask(word_question(shape, sorted(CURVES), _DEFAULT_CURVE))
+        curve = _ask_curve(layout, length, column, asker)
         assign_column(file, Quantity(column.plain_name, "angle"), column, asker)
         layout.add_contact(name, {"curve": curve, "column": column.plain_name})
         blanks = blanks or column.blanks > 0

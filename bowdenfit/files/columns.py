@@ -18,7 +18,9 @@ from bowdenfit.files.headings import (
     meanings,
     option_naming,
     plain_name,
+    rank_headings,
     split_brackets,
+    unit_to_state,
 )
 from bowdenfit.files.headings import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.measured_cells import split_measured
@@ -31,6 +33,7 @@ from bowdenfit.units import (
     contradiction,
     conversion_factor,
     dimension_of,
+    is_unit,
     route_conversion_factor,
     speed_dimension,
     weight_of,
@@ -249,11 +252,15 @@ def require_column(table: RawTable, columns: Mapping[str, Column], name: str, ex
     if name in columns:
         return columns[name]
     read = {column.heading for column in columns.values()}
-    table.faults.faults.append(_missing_column_error(table, name, example, read))
+    is_second = name == "output_force" and "input_force" not in columns
+    table.faults.faults.append(_missing_column_error(table, name, example, read, is_second))
     return _missing_column(table, name)
 
 
-def _missing_column_error(table: RawTable, name: str, example: str, read: Collection[str]) -> DatasetError:
+def _missing_column_error(
+    table: RawTable, name: str, example: str, read: Collection[str], is_second: bool = False
+) -> DatasetError:
+    """Return the refusal of a table without a column; with `is_second` the likeliest heading is that of another one."""
     remaining = [heading for heading in table.header if heading not in read]
     if values := find_pivot_headings(remaining):
         return DatasetError(
@@ -263,10 +270,19 @@ def _missing_column_error(table: RawTable, name: str, example: str, read: Collec
             "one row for each reading, in the columns wrap_angle_deg, input_force_N and output_force_N."
         )
     _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
-    option = option_naming(name, "NAME", unit.replace("_", "*"))
+    unit = unit.replace("_", "*")
+    holds_numbers = [any(is_plain_number(row[i].text) for row in table.rows[:1]) for i, _ in enumerate(table.header)]
+    columns = zip(table.header, table.units, holds_numbers, strict=True)
+    unread = [(heading, below) for heading, below, holds in columns if heading in remaining and holds]
+    likely = [unread[i] for i in rank_headings(unread, dimension_of(unit) if unit and is_unit(unit) else "")]
+    options = [option_naming(name, heading, unit_to_state(heading, below, unit)) for heading, below in likely[is_second:][:1]]
+    choice = [
+        f", or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})"
+        for option in options
+    ]
     return DatasetError(
         f"{table.file} has no column {name}{_suggest_heading(name, remaining)}; it has {quoted(table.header)}. Name the "
-        f"column {example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
+        f"column {example}{''.join(choice)}."
     )
 
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.clocks import names_time, unit_of_time
 from bowdenfit.files.spellings import parse_heading
-from bowdenfit.units import ColumnSource, differing_units, is_unit
+from bowdenfit.units import ColumnSource, differing_units, dimension_of, is_unit, weight_of
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
@@ -207,6 +207,30 @@ def plain_name(heading: str) -> str:
 def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--column") -> str:
     """Return the option that names a column or channel, as it can be pasted into a shell."""
     return f"{option} {quantity}={shlex.quote(heading + (f':{unit}' if unit else ''))}"
+
+
+def rank_headings(headings: Sequence[tuple[str, str]], dimension: str) -> list[int]:
+    """Return which columns may measure a dimension, the likeliest first: by their unit, by a weight, without one, others.
+
+    Args:
+        headings: Heading of each column, and the unit that the file gives elsewhere; both may be empty.
+        dimension: Such as "force".
+    """
+    ranks = list[tuple[int, int]]()
+    for i, (heading, below) in enumerate(headings):
+        unit = heading_of(heading, below).unit
+        fits = is_unit(unit) and dimension_of(unit) == dimension
+        weighs = dimension == "force" and bool(weight_of(unit))
+        rank = 0 if fits else 1 if weighs else 2 if not unit else 3
+        if heading and (dimension == "time" or not names_time(heading) or parse_heading(heading, below)):
+            ranks.append((rank, i))
+    return [i for _, i in sorted(ranks)]
+
+
+def unit_to_state(heading: str, below: str, usual: str) -> str:
+    """Return the unit that an option states next to a heading: that of a weight as a force, or the usual one without any."""
+    unit = heading_of(heading, below).unit
+    return weight_of(unit) or ("" if unit else usual)
 
 
 def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()) -> dict[str, ColumnSource]:

@@ -13,12 +13,16 @@ from bowdenfit.files.headings import find_candidates, heading_of, split_brackets
 from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, find_stated_angle, guess_file_kind
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, FileColumn, LoneFile
-from bowdenfit.units import ColumnSource, dimension_of, is_unit, multiple_of
+from bowdenfit.units import ColumnSource, dimension_of, is_unit, multiple_of, weight_of
 from bowdenfit.words import listed, shown
 
 _SPREAD = re.compile(
     r"(?:^|[\W_])(?:sd|std|stdev|sem|unc|uncertainty|error|err|noise|dev|deviation)(?:$|[\W_])", re.IGNORECASE
 )
+_MOST_NAMED = 8  # judged: columns that may be meant instead, which are listed
+_STEPS = 60  # judged: rows that are enough to see a clock rise in even steps
+_SLOWEST = 2.0  # steps from which a clock counts milliseconds rather than seconds; as `recordings.forces` has it
+_UNEVEN = 3.0  # judged: largest step of a clock over its smallest
 
 
 @dataclass(frozen=True)
@@ -30,12 +34,14 @@ class FitCommand:
         options: Its options with their arguments, such as ("--column", "input_force=Force 1:N").
         provided: Assumptions of the command, each as a clause.
         names_more: Whether it names columns that the user has not.
+        missing: Quantities that it needs and no column can be.
     """
 
     path: Path
     options: tuple[tuple[str, str], ...]
     provided: tuple[str, ...] = ()
     names_more: bool = False
+    missing: tuple[str, ...] = ()
 
     @property
     def parts(self) -> list[str]:
@@ -88,32 +94,48 @@ def _make_table_command(file: LoneFile, kind: str, always: bool = False) -> FitC
         kind: Name of the kind of measurement.
         always: Whether columns are named that say themselves what they are.
     """
-    options, provided = list[tuple[str, str]](), list[str]()
+    options, provided, missing = list[tuple[str, str]](), list[str](), list[str]()
     if file.table and find_pivot_headings(file.table.header) and not file.named:
         return FitCommand(file.path, ())
     if kind == "forces":
-        words, labels = _find_columns_of_words(file), _find_labels(file)
+        named, labels = {**_find_columns_of_words(file), **file.named}, _find_labels(file)
         could_be = [column for column in file.numbers if column.name not in labels]
         in_order = bool(find_candidates(file.headings, BESIDE_FORCES)["stroke"])
-        options, provided = _name_forces(could_be, "--column", {**words, **file.named}, always, in_order)
+        options, provided, missing = _name_forces(could_be, "--column", named, always, in_order)
     angle, of_angle = ([], []) if WRAP_ANGLE.name in file.named else _wrap_angle_options(file)
-    names = [argument for name, argument in (*angle, *options) if name == "--column"]
-    names_more = bool(names) and not any(argument.endswith("=NAME") for argument in names)
+    names_more = any(name == "--column" for name, _ in (*angle, *options))
     stated = _state_columns(file, "--column")
-    return FitCommand(file.path, (*angle, *stated, *options), (*of_angle, *provided), names_more)
+    return FitCommand(file.path, (*angle, *stated, *options), (*of_angle, *provided), names_more, tuple(missing))
 
 
 def _make_recording_command(file: LoneFile, always: bool = False) -> FitCommand:
     """Make the command that fits a recording; with `always` channels are named that say themselves what they are."""
-    options, provided = _name_forces(file.signals, "--channel", file.named, always, in_order=True)
-    if not file.has_clock and "time" not in file.named:
-        options.append(("--channel", "time=RATE"))
-        provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not state")
+    clock = None if file.has_clock or "time" in file.named else _find_unnamed_clock(file.signals)
+    signals = [column for column in file.signals if column is not clock]
+    options, provided, missing = _name_forces(signals, "--channel", file.named, always, in_order=True)
+    if clock is not None:
+        unit = "s" if np.diff(clock.values[:_STEPS]).max() < _SLOWEST else "ms"
+        options.append(("--channel", _naming("time", clock.name, unit)))
+        provided.append(f"{shown(clock.name)} is the time in {unit}, as the file does not state")
+    elif not file.has_clock and "time" not in file.named:
+        options.append(("--channel", "time=1000Hz"))
+        provided.append("1000 Hz is its sampling rate, which the file does not state")
     elif file.doubtful_clock and "time" not in file.named:
         options.append(("--channel", _naming("time", file.doubtful_clock, "ms")))
         provided.append(f"{shown(file.doubtful_clock)} is in milliseconds, as the file does not state")
     angle, of_angle = _stated_angle_options(file)
-    return FitCommand(file.path, (*angle, *_state_columns(file, "--channel"), *options), (*of_angle, *provided))
+    stated = _state_columns(file, "--channel")
+    return FitCommand(file.path, (*angle, *stated, *options), (*of_angle, *provided), missing=tuple(missing))
+
+
+def _find_unnamed_clock(columns: Sequence[FileColumn]) -> FileColumn | None:
+    """Return the first column that rises in even steps as a clock does, and states no unit; None without one."""
+    for column in columns:
+        steps = np.diff(column.values[:_STEPS])
+        rises = len(steps) > 1 and steps.min() > 0 and steps.max() < _UNEVEN * steps.min()
+        if rises and not column.written_unit and not column.is_index:
+            return column
+    return None
 
 
 def _name_forces(
@@ -122,8 +144,8 @@ def _name_forces(
     named: Mapping[str, ColumnSource],
     always: bool = False,
     in_order: bool = False,
-) -> tuple[list[tuple[str, str]], list[str]]:
-    """Return the options that name the forces at both ends, and what they take for granted.
+) -> tuple[list[tuple[str, str]], list[str], list[str]]:
+    """Return the options that name the forces at both ends, what they take for granted, and ends that no column can be.
 
     Args:
         columns: Columns or channels of numbers.
@@ -138,36 +160,48 @@ def _name_forces(
     ends = {name: columns[candidates[0].position] for name, candidates in can_be.items() if candidates}
     sure = {name for name, candidates in can_be.items() if len(candidates) == 1}
     unnamed = [quantity.name for quantity in FORCES if quantity.name not in named]
-    missing, provided = [name for name in unnamed if name not in ends], list[str]()
-    remaining = _forces_among([column for column in columns if column not in ends.values()])
-    if missing and len(remaining) == len(missing):
-        remaining = remaining if in_order else sorted(remaining, key=lambda column: -column.mean)  # a pulled cable loses force
-        ends |= dict(zip(missing, remaining, strict=True))
-        provided += [f"{shown(ends[name].name)} is the {name}" for name in missing]
-    elif missing:
-        ends |= {name: FileColumn("NAME", "N", "N", np.zeros(0), True, False) for name in missing}
-        provided += [f"NAME is the {option.removeprefix('--')} of the {name}" for name in missing]
-    elif len(sure) < len(unnamed):
+    missing = [name for name in unnamed if name not in ends]
+    remaining = _forces_among([column for column in columns if column not in ends.values()], len(missing))
+    best = remaining[: len(missing)]
+    best = best if in_order else sorted(best, key=lambda column: -column.mean)  # a pulled cable loses force
+    ends |= dict(zip(missing, best, strict=False))
+    provided = [f"{shown(ends[name].name)} is the {name}" for name in missing if name in ends]
+    if provided and len(remaining) > len(best):
+        also = listed([shown(column.name) for column in remaining[len(best) :][:_MOST_NAMED]])
+        provided[-1] += f" rather than {also}"
+    if not missing and len(sure) < len(unnamed):
         provided += [f"{shown(ends[name].name)} is the {name}" for name in ends if name not in sure]
+    unnamed = [name for name in unnamed if name in ends]
     multiples = {name: multiple for name in unnamed if (multiple := multiple_of(split_brackets(ends[name].name)[1]))}
     for name, (factor, unit) in multiples.items():
         provided.append(f"the numbers under {shown(ends[name].name)} are multiplied by {factor} and headed ({unit})")
     options = []
     for name in [name for name in unnamed if name not in multiples]:
-        unit = "" if ends[name].written_unit else "N"
+        unit = weight_of(ends[name].written_unit) or ("" if ends[name].written_unit else "N")
         if always or unit or name not in sure:
             options.append((option, _naming(name, ends[name].name, unit)))
     if any(not column.written_unit for name, column in ends.items() if name not in multiples):
         provided.append("the forces are in newtons, as the file does not state")
-    return options, provided
+    return options, provided, [name for name in missing if name not in ends]
 
 
-def _forces_among(columns: Sequence[FileColumn]) -> list[FileColumn]:
-    """Return the columns that can be forces: those in units of force, or else those without any unit."""
+def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]:
+    """Return the columns that can be forces, the likeliest first: in units of force, of weight, none, of signals.
+
+    Args:
+        columns: Columns of numbers.
+        least: Number of columns from which unlikelier ones are left out.
+    """
+    units = {column.name: column.written_unit for column in columns}
     measured = [column for column in columns if not (_SPREAD.search(column.name) or column.is_index)]
-    units = {column.name: column.written_unit for column in measured}
     of_force = [column for column in measured if is_unit(units[column.name]) and dimension_of(units[column.name]) == "force"]
-    return of_force or [column for column in measured if not units[column.name]]
+    of_weight = [column for column in measured if weight_of(units[column.name])]
+    without_unit = [column for column in measured if not units[column.name]]
+    signals = [column for column in measured if units[column.name] and column.dimension in ("", "other", "ratio")]
+    likely = list[FileColumn]()
+    for group in (of_force, of_weight, without_unit, [column for column in signals if column not in of_weight]):
+        likely += group if len(likely) < least else []
+    return likely
 
 
 def make_ambiguity_error(file: LoneFile) -> DatasetError:

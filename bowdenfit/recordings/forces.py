@@ -8,8 +8,8 @@ import numpy as np
 from bowdenfit.description.cable_parts import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.clocks import YEARS
-from bowdenfit.files.headings import option_naming
+from bowdenfit.files.clocks import YEARS, is_clock
+from bowdenfit.files.headings import find_candidates, option_naming, rank_headings, unit_to_state
 from bowdenfit.files.pieces import have_same_numbers
 from bowdenfit.recordings.named_channels import (
     OUTPUT_CLOCK,
@@ -227,9 +227,11 @@ def _torques(
             continue
         channel = find_channel(file, quantity, sources)
         if channel is not None and force in by_quantity and (force in sources or quantity.name not in sources):
+            by_force, by_torque = by_quantity[force].name, channel.name
             raise DatasetError(
-                f"{file.path.name} has both {force} ({shown(by_quantity[force].name)}) and {quantity.name} "
-                f"({shown(channel.name)}); say which is meant: --channel {force}=NAME:N or --channel {quantity.name}=NAME:N*m."
+                f"{file.path.name} has both {force} ({shown(by_force)}) and {quantity.name} ({shown(by_torque)}); say which is "
+                f"meant: {option_naming(force, by_force, 'N', '--channel')} or "
+                f"{option_naming(quantity.name, by_torque, 'N*m', '--channel')}."
             )
         if channel is not None:
             torques[force] = channel
@@ -263,10 +265,19 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
         else "If a second logger recorded it, give its file first and join this one: bowdenfit fit FILE --join "
         f"{file.path.name}."
     )
+    has = f"{file.path.name} has no channel {quantity}; it has {quoted(tuple(c.name for c in file.channels))}."
+    headings = [(channel.name, channel.unit) for channel in file.channels if not is_clock(channel)]
+    others = [matches for name, matches in find_candidates(headings, WANTED).items() if name != quantity]
+    taken = {match.position for matches in others for match in matches}
+    headings = [heading for i, heading in enumerate(headings) if i not in taken]
+    if not (likely := rank_headings(headings, "force")):
+        return DatasetError(f"{has} {other}")
+    name, below = headings[likely[0]]
+    unit = unit_to_state(name, below, "N")
+    in_toml = f'name = "{name}"' + (f', unit = "{unit}"' if unit else "")
     return DatasetError(
-        f"{file.path.name} has no channel {quantity}; it has {quoted(tuple(c.name for c in file.channels))}. Say which "
-        f'it is and its unit: --channel {quantity}=NAME:N, or channels = {{ {quantity} = {{ name = "NAME", unit = '
-        f'"N" }} }} in cable.toml. {other}'
+        f"{has} Say which it is and its unit: {option_naming(quantity, name, unit, '--channel')}, or channels = "
+        f"{{ {quantity} = {{ {in_toml} }} }} in cable.toml. {other}"
     )
 
 

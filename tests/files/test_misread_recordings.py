@@ -135,7 +135,7 @@ def test_a_recording_without_a_clock_is_asked_about(tmp_path, run, heading):
     rows = [(index + "{1:.3f},{2:.3f}").format(i, force[i] + noise[i, 0], output[i] + noise[i, 1]) for i in range(600)]
     (tmp_path / "log.csv").write_text("\n".join([heading, *rows]) + "\n")
     code, out, _ = run("check", tmp_path / "log.csv")
-    assert code == 2 and "To fit it as a table:" in out and "--channel time=RATE" in out
+    assert code == 2 and "To fit it as a table:" in out and "--channel time=1000Hz" in out
     if "cell A" in heading:
         assert "--channel input_force='cell A:N'" in out
 

@@ -204,7 +204,7 @@ HEADINGS = [
     ("input_force_N", "input_force [quux]", ["'quux'", "not known"]),
     ("time_s", "time_N", ["'time_N'", "'N'", "time", "ms"]),
     ("velocity_mm/s", "velocity_N", ["'velocity_N'", "'N'", "mm/s"]),
-    ("output_force_N", "ai1", ["no channel output_force", "'ai1'", "--channel output_force=NAME:N", "cable.toml"]),
+    ("output_force_N", "ai1", ["no channel output_force", "'ai1'", "--channel output_force=ai1:N", "cable.toml"]),
 ]
 
 

@@ -196,6 +196,10 @@ def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> li
     """
     lines, when = list[str](), "" if usable else " once that is corrected"
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
+        if command.missing:
+            ends = listed([f"the {name}" for name in command.missing])
+            lines += [filled(f"No column is left that could be {ends}; add it to the file.")]
+            continue
         lines += [f"To fit it{f' as {what}' if what else ''}{when}:", wrap_command(command)]
         granted = listed([f"that {assumption}" for assumption in command.provided])
         lines += [filled(f"This assumes {granted}; change what is wrong.")] if granted else []

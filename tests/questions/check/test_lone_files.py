@@ -69,7 +69,7 @@ def test_an_index_is_no_clock(tmp_path):
     path = write(tmp_path, ("Index", "Fin (N)", "Fout (N)"), (range(len(time)), force, output))
     guess = guess_file_kind(path)
     assert (guess.kind, guess.other) == ("forces", "recordings")
-    with pytest.raises(bf.DatasetError, match=r"could be a table of readings or a recording.*--channel time=RATE"):
+    with pytest.raises(bf.DatasetError, match=r"could be a table of readings or a recording.*--channel time=1000Hz"):
         bf.read(path, wrap_angle=(180, "deg"))
 
 
@@ -185,8 +185,9 @@ def test_loads_are_counted_where_readings_fall_together(forces, count):
 def test_what_the_user_has_named_is_kept_and_the_other_end_found(tmp_path, run):
     force, load = trials()
     path = write(tmp_path, ("Cell A (N)", "Cell B (N)", "Cell C (N)"), (load, force, 2 * force))
-    code, _, err = run("check", path, "--column", "input_force=Cell B (N)")
-    assert code == 2 and "no column output_force" in err
+    code, out, _ = run("check", path, "--column", "input_force=Cell B (N)")
+    assert code == 2 and "no column output_force" in out
+    assert "'Cell A (N)' is the output_force rather than 'Cell C (N)'" in " ".join(out.split())
     path = write(tmp_path, ("Cell A (N)", "Cell B (N)"), (load, force), "two.csv")
     _, out, _ = run("check", path, "--column", "input_force=Cell B (N)")
     (words,) = command(out)
@@ -284,7 +285,7 @@ def test_the_label_of_a_run_is_not_taken_for_a_force(run, tmp_path):
     path = tmp_path / "words.csv"
     path.write_text("run,in,out\n1,50,low\n2,60,high\n")
     code, out, _ = run("check", path)
-    assert code == 2 and "--column output_force=NAME" in out, out
+    assert code == 2 and "No column is left that could be the output_force" in out, out
 
 
 def test_what_the_command_names_ends_with_2_until_it_is_named(run, tmp_path):
@@ -298,3 +299,40 @@ def test_a_recording_that_cannot_be_used_ends_with_2(run, tmp_path):
     path = write(tmp_path, ("Time (s)", "Fin (N)", "Fout (N)"), (time, force, np.full(len(time), 3.0)))
     code, out, _ = run("check", path)
     assert code == 2 and "To fit it once that is corrected:" in out, out
+
+
+PLACEHOLDERS = ("NAME", "RATE")
+
+
+@pytest.mark.parametrize(
+    ("headings", "named"),
+    [
+        (("Sample", "Elapsed Time (s)", "Input (lb)", "Output (lb)"), ("Input:lbf", "Output:lbf")),
+        (("Sample", "time (s)", "Cell A (N)", "Cell B (N)", "Cell C (N)"), ("Cell A", "Cell B")),
+        (("Sample", "time (s)", "ai0", "ai1", "Temperature (degC)"), ("ai0:N", "ai1:N")),
+    ],
+)
+def test_the_command_names_the_likeliest_columns_and_never_a_placeholder(run, tmp_path, headings, named):
+    time, force, output = recorded()
+    columns = (range(1, len(time) + 1), time, force, output, 0 * time + 21.5 + np.sin(time))[: len(headings)]
+    code, out, _ = run("check", write(tmp_path, headings, columns))
+    (words,) = command(out)
+    assert words[-4:] == ["--channel", f"input_force={named[0]}", "--channel", f"output_force={named[1]}"]
+    assert not any(placeholder in out for placeholder in PLACEHOLDERS)
+    assert code == 2 and run("check", *words[1:])[0] == 0
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "s"), (1000.0, "ms")])
+def test_columns_without_headings_are_named_by_place_and_one_that_rises_evenly_is_the_clock(run, tmp_path, scale, unit):
+    time, force, output = recorded()
+    path = write(tmp_path, ("0", "60", "58"), ((scale * time)[1:], force[1:], output[1:]), "log.csv")
+    _, out, _ = run("check", path)
+    assert f"time=column1:{unit}" in out and "input_force=column2:N" in out and "output_force=column3:N" in out, out
+    assert not any(placeholder in out for placeholder in PLACEHOLDERS)
+    assert run("check", *next(words for words in command(out) if "--channel" in words)[1:])[0] == 0
+
+
+def test_without_a_column_that_could_be_a_force_there_is_no_command(run, tmp_path):
+    path = write(tmp_path, ("time (s)", "Fin (N)"), recorded()[:2])
+    code, out, _ = run("check", path)
+    assert code == 2 and command(out) == [] and "No column is left that could be the output_force" in out

@@ -201,11 +201,19 @@ class Cell:
 
 
 def parse_number(text: str, decimal: str) -> float | None:
-    """Return the number of a recording with one decimal mark, NaN where it is missing, None where there is text."""
-    match = _NUMBER.fullmatch(text) or _NUMBER.fullmatch(_normalize(text))
+    """Return the number of a recording with one decimal mark, NaN where it is missing, None where there is text.
+
+    Thousands are read where their separator cannot be a decimal mark: a blank or an apostrophe, and a comma or point only
+    before the decimal mark that is the other one.
+    """
+    match = _NUMBER.fullmatch(text) or _NUMBER.fullmatch(plain := _normalize(text))
     if match:
         return float(match[0].replace(",", ".")) if match["mark"] in (None, decimal) else None
-    return math.nan if _normalize(text).lower() in MISSING else None
+    grouped = _GROUPED.fullmatch(plain)
+    if grouped and grouped["separator"] != decimal and (grouped["mark"] or grouped["separator"] in " '"):
+        digits = plain.replace(grouped["separator"], "").replace(",", ".")
+        return float(digits) if grouped["mark"] in (None, decimal) else None
+    return math.nan if plain.lower() in MISSING else None
 
 
 def classify_cell(text: str, decimal: str) -> Kind:

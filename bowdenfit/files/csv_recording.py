@@ -50,7 +50,9 @@ from bowdenfit.files.text_file import (
     last_lines,
     lines_between,
     refuse_long_row,
+    remark_on_nul_tail,
     split_cells,
+    text_size,
 )
 from bowdenfit.units import is_unit
 
@@ -95,8 +97,8 @@ def read(path: Path) -> ChannelFile:
 
     Understands comma, semicolon, tab, bar and blanks between columns; decimal point and comma; UTF-8, UTF-16 and
     Windows encodings; comments (#, %); lines before the headings, a line of units below them, rows of statistics below
-    the data; a pair of columns for each run; dates as time; a file that breaks off in its last line. It does not
-    understand separators of thousands.
+    the data; a pair of columns for each run; dates as time; a file that breaks off in its last line; separators of
+    thousands that cannot be decimal marks.
 
     Limits: files of up to 2 GiB (`LARGEST_BYTES`), and of 2 GiB of numbers. They are read in pieces; the memory needed is that
     of the numbers and of one column more. Of more rows than `_MANY_ROWS`, columns that are no clock are kept with 24 bits, as
@@ -116,7 +118,7 @@ def read(path: Path) -> ChannelFile:
     check_encoding(path)
     last = last_lines(path, sheet.encoding, sheet.start, _LAST_BYTES)[-_LAST_ROWS:]
     cut = _is_cut(last[-51:], sheet.separator)
-    stop = last[-1].start if cut else path.stat().st_size
+    stop = last[-1].start if cut else text_size(path)
     if stop <= sheet.start:
         raise DatasetError(f"{path.name} breaks off before its first whole row of numbers; copy or export it again.")
     split = last[0].start if last else stop
@@ -127,7 +129,8 @@ def read(path: Path) -> ChannelFile:
     timed, clock = assign_rate_times(channels, sheet.metadata)
     row = count_rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    whole = make_channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *columns.remarks, *clock))
+    remarks = (*left_out, *broken, *remark_on_nul_tail(path), *columns.remarks, *clock)
+    whole = make_channel_file(path, "CSV", timed, UnreadNames(), remarks)
     return replace(whole, account=_account_rows(path, sheet, columns, quick, stop))
 
 
@@ -282,7 +285,7 @@ def _account_rows(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[
         stop: Where the last whole row ends [bytes].
     """
     end, rows = quick
-    size = path.stat().st_size
+    size = text_size(path)
     first = count_rows_before(path, sheet.start) + 1
     reasons = {**sheet.above, **columns.left_out}
     if end > sheet.start and count_rows_before(path, end) - first + 1 != rows:
@@ -298,4 +301,4 @@ def _ends_with_newline(path: Path, size: int) -> bool:
     """Return whether the last line has an end."""
     with path.open("rb") as file:
         file.seek(max(size - 2, 0))
-        return file.read().rstrip(b"\0").endswith((b"\n", b"\r"))
+        return file.read(2).rstrip(b"\0").endswith((b"\n", b"\r"))

@@ -21,6 +21,7 @@ from bowdenfit.files.text_file import (
     first_bytes,
     first_lines,
     refuse_long_row,
+    remark_on_nul_tail,
     short_row_error,
 )
 from bowdenfit.inputs import refuse_special
@@ -125,7 +126,8 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
             )
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    return make_table(name, all_lines, rows, separator)
+    table = make_table(name, all_lines, rows, separator)
+    return replace(table, remarks=(*table.remarks, *(f"{name}: {remark}" for remark in remark_on_nul_tail(path))))
 
 
 def _refuse_large(path: Path) -> None:

@@ -103,6 +103,27 @@ def first_bytes(path: Path, most: int = -1) -> bytes:
     return data
 
 
+def text_size(path: Path) -> int:
+    """Return the size of a text without the NUL bytes behind it, which loggers leave that reserve room in advance [bytes]."""
+    size = stop = path.stat().st_size
+    with path.open("rb") as file:
+        if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
+            return size  # letters of UTF-16 have such bytes
+        while stop > 0:
+            start = max(0, stop - _PIECE)
+            file.seek(start)
+            if remaining := len(file.read(stop - start).rstrip(b"\x00")):
+                return start + remaining
+            stop = start
+    return 0
+
+
+def remark_on_nul_tail(path: Path) -> tuple[str, ...]:
+    """Return a remark on the NUL bytes behind a text; none without them."""
+    nul = path.stat().st_size - text_size(path)
+    return (f"{nul} NUL bytes behind the last row were left out: room that a logger had reserved.",) if nul else ()
+
+
 def check_encoding(path: Path) -> None:
     """Refuse a text of which a part is in another encoding than its beginning, or that is cut off inside a letter.
 
@@ -113,8 +134,8 @@ def check_encoding(path: Path) -> None:
         beginning = file.read(4)
         encoding = next((name for mark, name in _BYTE_ORDER_MARKS if beginning.startswith(mark)), "utf-8")
         file.seek(0)
-        before = 0
-        while data := file.read(_PIECE):
+        before, stop = 0, text_size(path)
+        while data := file.read(min(_PIECE, stop - before)):
             if (other := _other_encoding(data, encoding)) is not None:
                 row = count_rows_before(path, before + other) + 1
                 raise DatasetError(
@@ -148,6 +169,7 @@ def first_lines(data: bytes, name: str, whole: bool, most: int | None = None) ->
     Raises:
         DatasetError: It is no text.
     """
+    data = data if data.startswith((b"\xff\xfe", b"\xfe\xff")) else data.rstrip(b"\x00") or data  # see `text_size`
     encoding, mark = _encoding(data, name, whole)
     return encoding, _lines(data[mark:], encoding, mark, most)
 
@@ -157,10 +179,11 @@ def last_lines(path: Path, encoding: str, start: int, most: int) -> list[Line]:
 
     Their rows count from the first of them; `count_rows_before` gives what to add.
     """
-    skipped = max(start, (path.stat().st_size - most) // 2 * 2 + start % 2)
+    stop = text_size(path)
+    skipped = max(start, (stop - most) // 2 * 2 + start % 2)
     with path.open("rb") as file:
         file.seek(skipped)
-        lines = _lines(file.read(), encoding, skipped)
+        lines = _lines(file.read(stop - skipped), encoding, skipped)
     return lines if skipped == start else lines[1:]
 
 

@@ -75,7 +75,8 @@ def rows_of(path):
     if path.suffix == ".xlsx":
         return max(sheet.max_row for sheet in openpyxl.load_workbook(path))
     text = path.read_bytes()
-    return len(text.decode("utf-16").splitlines() if text.startswith(b"\xff\xfe") else text.splitlines())
+    is_wide = text.startswith(b"\xff\xfe")
+    return len(text.decode("utf-16").splitlines() if is_wide else text.rstrip(b"\x00").splitlines())
 
 
 def command_of(text):

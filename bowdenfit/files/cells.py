@@ -71,6 +71,22 @@ class Decimals:
                     wholes[i] = other
         return [replace(self, whole=whole) for whole in wholes]
 
+    def likely_thousands(self, columns: Sequence[Sequence[str]]) -> list[tuple[int, str]]:
+        """Return columns in which every number has three digits behind a point, though nothing in the file makes it decimal.
+
+        Args:
+            columns: The cells of each column.
+
+        Returns:
+            Position of each such column, and its first number.
+        """
+        likely = []
+        for i, texts in enumerate(columns):
+            numbers = [text.strip() for text in texts if is_plain_number(text)]
+            if len(numbers) > 1 and "." not in self.seen and all("." in n and _AMBIGUOUS.fullmatch(n) for n in numbers):
+                likely.append((i, numbers[0]))
+        return likely
+
     def other(self, mark: str) -> str | None:
         """Return a number of the file that speaks against `mark` being decimal."""
         return self.seen.get("," if mark == "." else ".")

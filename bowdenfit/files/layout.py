@@ -112,9 +112,13 @@ def read_headings(filled: Sequence[CsvRecord], position: int, place: str, groups
         units = [strip_brackets(cell) for cell in below.cells]
         refuse_two_units(f"{place}, row {below.row}", header.cells, units)
     names = [" ".join(cell.split()) for cell in header.cells]
-    if position and _is_over(filled[position - 1], names, groups):
-        names = _join_groups(drop_label(filled[position - 1].cells), names)
-        rows.insert(0, filled[position - 1])
+    above = list(filled[max(position - 2, 0) : position])
+    if len(above) > 1 and not units and is_units(above[-1]) and _repeats(above[0]):  # names, units, and which end they are of
+        units = [strip_brackets(cell) for cell in above[-1].cells]
+        names, rows = _join_groups(above[0].cells, names), [*above, *rows]
+    elif above and (_is_over(above[-1], names, groups) or _completes(above[-1], names)):
+        names = _join_groups(drop_label(above[-1].cells), names)
+        rows.insert(0, above[-1])
     return Headings(tuple(rows), header, tuple(names), tuple(units))
 
 
@@ -128,6 +132,18 @@ def _is_over(above: CsvRecord, names: Sequence[str], groups: bool) -> bool:
         return True
     are_labeled = all(is_number(cell) for cell in drop_label(above.cells) if cell.strip())
     return (are_labeled and (is_repeated or are_numbers)) or (is_repeated and groups and is_words(above, 1))
+
+
+def _repeats(row: CsvRecord) -> bool:
+    """Return whether a row is one of words of which some stand over several columns, one by one, such as Time, Force, Force."""
+    written = [cell.strip().lower() for cell in row.cells if cell.strip()]
+    return is_words(row) and not is_units(row) and len(set(written)) < len(written)
+
+
+def _completes(above: CsvRecord, names: Sequence[str]) -> bool:
+    """Return whether a row of words that repeat has the only heading of a column, such as the time beside input and output."""
+    alone = [upper for upper, name in zip(above.cells, names, strict=False) if upper.strip() and not name]
+    return _repeats(above) and bool(alone)
 
 
 def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:

@@ -24,6 +24,7 @@ from bowdenfit.files.text_file import (
     remark_on_nul_tail,
     short_row_error,
 )
+from bowdenfit.files.unit_columns import in_one_unit, join_unit_columns
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
@@ -192,7 +193,7 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
             "table that was exported on its side, or without line ends: keep the columns of forces, angles, strokes and runs."
         )
     _refuse_many_cells(name, rows)
-    parts = split_table(rows, name)
+    parts, with_units = join_unit_columns(split_table(rows, name))
     header = _header(parts, name)
     if not parts.body:
         raise DatasetError(
@@ -205,17 +206,35 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
     fewest = _fewest_cells(parts.body, len(header))
     cells = tuple(wrong_width.read_all(lambda row: _cells(name, header, row, in_column, fewest), parts.body, nothing))
     wrong_width.refuse()
+    cells = _in_one_unit(header, cells, with_units)
     below = (*parts.headings.units, *[""] * len(header))[: len(header)]
     units = tuple(
         _unit_of(heading, unit, header, [row[i] for row in cells])
         for i, (heading, unit) in enumerate(zip(header, below, strict=True))
     )
     account = _account(name, lines, rows, parts, len(header))
-    remarks: tuple[str, ...] = ()
+    thousands = [] if separator == "," else decimals.likely_thousands([_column(parts.body, i) for i in range(len(header))])
+    remarks = tuple(f"{name}: the column behind {shown(heading)} says the unit of each row." for heading in with_units)
+    remarks += tuple(
+        f"{name}: every number under {shown(header[i])} has three digits behind its mark, as in {shown(text)}, and they are "
+        "read as decimals; if they are thousands, write the numbers without that mark."
+        for i, text in thousands
+    )
     if long := unpivot(header, units, cells):
-        header, units, cells, remarks = long.header, long.units, long.rows, (f"{name}: {long.remark}",)
+        header, units, cells, remarks = long.header, long.units, long.rows, (*remarks, f"{name}: {long.remark}")
     errors = _errors_in_cells(header, cells)
     return RawTable(name, header, parts.headings.rows[0].row, cells, units, account, errors, remarks)
+
+
+def _in_one_unit(
+    header: Sequence[str], rows: tuple[tuple[Cell, ...], ...], named: Sequence[str]
+) -> tuple[tuple[Cell, ...], ...]:
+    """Return rows in which the cells of the named columns are in one unit each."""
+    if not named:
+        return rows
+    by_heading = zip(header, zip(*rows, strict=True), strict=True)
+    columns = [in_one_unit(cells) if heading in named else cells for heading, cells in by_heading]
+    return tuple(zip(*columns, strict=True))
 
 
 def _header(parts: TableParts, file: str) -> tuple[str, ...]:

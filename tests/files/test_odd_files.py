@@ -57,3 +57,40 @@ def test_a_recording_ends_before_its_nul_bytes(tmp_path):
     file = read_channels(write(tmp_path, text.encode() + bytes(100_000)))
     assert [len(channel.values) for channel in file.channels] == [len(TIME)] * 3
     assert file.account.rows == len(TIME) + 1 and "100000 NUL bytes" in " ".join(file.remarks)
+
+
+def test_names_units_and_ends_in_three_rows_are_headings_and_other_rows_above_are_not(tmp_path):
+    body = "".join(f"{t:.2f};{a:.2f};{b:.2f}\n" for t, a, b in zip(TIME, INPUT, OUTPUT, strict=True))
+    for top in ("Time;Force;Force\ns;N;N\n;input;output\n", "Time;Force;Force\n;input;output\ns;N;N\n"):
+        channels = read_channels(write(tmp_path, top + body)).channels
+        assert [(c.name, c.unit) for c in channels] == [("Time", "s"), ("Force input", "N"), ("Force output", "N")]
+    other = "Bench;Old;New\nTime (s);F_in (N);F_out (N)\n"
+    assert [c.name for c in read_channels(write(tmp_path, other + body)).channels] == ["Time", "F_in", "F_out"]
+
+
+def test_a_unit_in_each_row_converts_its_number_and_one_that_measures_something_else_is_refused(tmp_path):
+    text = "Fin,Unit,Fout,Unit\n200.0,N,140.1,N\n1.0021,kN,702.5,N\n0.4,kN,281.2,N\n"
+    table = read_table(write(tmp_path, text))
+    assert (table.header, table.units) == (("Fin", "Fout"), ("N", "N"))
+    assert [row[0].number() for row in table.rows] == pytest.approx([200.0, 1002.1, 400.0])
+    assert bf.read(write(tmp_path, text), wrap_angle="180deg").measurements.tables
+    for wrong, what in (("0.4,mm", "another unit"), ("0.4,", "has no unit")):
+        with pytest.raises(bf.DatasetError, match=what):
+            bf.read(write(tmp_path, text.replace("0.4,kN", wrong)), wrap_angle="180deg")
+    with pytest.raises(bf.DatasetError, match="appears twice"):
+        read_table(write(tmp_path, "Fin (N),Note,Fout (N),Note\n20,a,14,b\n40,a,28,b\n"))
+
+
+@pytest.mark.parametrize(
+    ("text", "doubtful"),
+    [
+        ("Fin (N);Fout (N)\n2.000;1.284\n5.000;3.342\n", 2),
+        ("Fin (N);Fout (N)\n2.000;1.284\n5.000;3.34\n", 0),
+        ("Fin (N);Fout (N);angle (deg)\n2.000;1.284;180.5\n5.000;3.342;180.5\n", 0),
+        ("Fin (N);Fout (N)\n2,000;1,284\n5,000;3,342\n", 0),
+        ("Fin (N),Fout (N)\n2.000,1.284\n5.000,3.342\n", 0),
+    ],
+)
+def test_three_digits_behind_every_point_are_reported_where_they_may_be_thousands(tmp_path, text, doubtful):
+    table = read_table(write(tmp_path, text))
+    assert sum("if they are thousands" in remark for remark in table.remarks) == doubtful

@@ -10,6 +10,7 @@ from typing import Any, Generic, TypeVar
 from bowdenfit.description import MOST_FILES, Description
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.files.columns import Column, Quantity, find_columns
+from bowdenfit.files.merged_cells import fill_merged_cells
 from bowdenfit.files.missing_codes import MissingCodes, leave_out_coded_rows
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import RawTable, read_table
@@ -95,7 +96,7 @@ class Source:
         """
         codes = MissingCodes(self.settings.missing)
         table = codes.mark(read_table(path))
-        columns = find_columns(table, wanted, self.columns, unused)
+        table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)
         return leave_out_coded_rows(table, columns, wanted, codes)
 
     def name_of(self, path: Path) -> str:

@@ -1,7 +1,7 @@
 """From the channels of a file to a recording: both forces, the velocity, and the clock of each."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from bowdenfit.words import quoted, shown
 _FORCES = ("input_force", "output_force")
 FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
 _SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
+_MOST_TOGETHER, _FEWEST_ROWS = 0.5, 0.9  # shares of rows with both forces, and with one, in a table that joins two clocks
 _SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
 
 
@@ -86,6 +87,32 @@ def to_recording(
             is_loop,
         ),
         unit,
+    )
+
+
+def separate_joined_clocks(raw: RawRecording) -> tuple[RawRecording, tuple[str, ...]]:
+    """Return a recording in which each force has a clock of its own, where two were joined in one table, and a remark.
+
+    In a table that joins two clocks, each row holds the force whose clock it is of, and a blank for the other one.
+    """
+    if len(raw.input_time) != len(raw.output_time) or raw.input_time is not raw.output_time:
+        return raw, ()
+    has_input, has_output = np.isfinite(raw.input_force), np.isfinite(raw.output_force)
+    fewest = min(np.count_nonzero(has_input), np.count_nonzero(has_output))
+    both, either = np.count_nonzero(has_input & has_output), np.count_nonzero(has_input | has_output)
+    if fewest < FEW_SAMPLES or both > _MOST_TOGETHER * fewest or either < _FEWEST_ROWS * len(has_input):
+        return raw, ()
+    time = raw.input_time
+    separate = replace(
+        raw,
+        input_time=time[has_input],
+        input_force=raw.input_force[has_input],
+        output_time=time[has_output],
+        output_force=raw.output_force[has_output],
+    )
+    return separate, (
+        f"{raw.file}: {len(time) - both} of {len(time)} rows hold one force and a blank for the other, as two clocks joined in "
+        "one table do; each force is taken on its own clock.",
     )
 
 

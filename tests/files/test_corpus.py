@@ -53,7 +53,7 @@ def test_every_row_of_a_file_is_read_or_named_with_its_reason(name):
     truth, path = UNDERSTOOD[name], CORPUS / name
     account = read_channels(path).account if truth["kind"] == "recording" else read_table(path).account
     assert account.rows == account.accounted == rows_of(path)
-    assert account.read == truth["readings"]
+    assert account.read == truth.get("rows", truth["readings"])  # two clocks that were joined share the rows
     assert len(account.beside) == truth.get("beside", 0)
     if "headings" in truth:
         assert list(account.headings) == truth["headings"]

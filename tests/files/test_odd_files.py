@@ -12,7 +12,10 @@ pytestmark = pytest.mark.extended
 
 TIME = np.arange(0, 16, 0.05)
 INPUT = 40 + 20 * np.sin(2 * np.pi * TIME / 8)
-OUTPUT = 0.75 * INPUT
+OUTPUT = np.empty_like(INPUT)
+state = INPUT[0] / 1.4
+for row, force in enumerate(INPUT):
+    OUTPUT[row] = state = min(max(state, force / 1.4), force * 1.4)
 TABLE = "input_force_N,output_force_N\n20,14.1\n40,28.0\n60,42.2\n"
 
 
@@ -94,3 +97,47 @@ def test_a_unit_in_each_row_converts_its_number_and_one_that_measures_something_
 def test_three_digits_behind_every_point_are_reported_where_they_may_be_thousands(tmp_path, text, doubtful):
     table = read_table(write(tmp_path, text))
     assert sum("if they are thousands" in remark for remark in table.remarks) == doubtful
+
+
+def rows_of_joined_clocks(blank_share=1.0):
+    """Return a table in which every row holds the force of one clock; of some rows both."""
+    rows = ["time_s,input_force_N,output_force_N"]
+    for i, (t, a) in enumerate(zip(TIME, INPUT, strict=True)):
+        later = OUTPUT[i]
+        if i < blank_share * len(TIME):
+            rows += [f"{t:.3f},{a:.3f},", f"{t + 0.02:.3f},,{later:.3f}"]
+        else:
+            rows += [f"{t:.3f},{a:.3f},{later:.3f}", f"{t + 0.02:.3f},{a:.3f},{later:.3f}"]
+    return "\n".join(rows) + "\n"
+
+
+def test_two_clocks_joined_in_one_table_are_taken_apart_and_dropouts_are_not(tmp_path):
+    data = bf.read(write(tmp_path, rows_of_joined_clocks()), wrap_angle="180deg")
+    assert "two clocks joined in one table" in " ".join(data.measurements.remarks)
+    assert data.measurements.tables[0].items[0].account.samples == len(TIME)
+    data = bf.read(write(tmp_path, rows_of_joined_clocks(0.1)), wrap_angle="180deg")
+    assert "two clocks joined" not in " ".join(data.measurements.remarks)
+    assert data.measurements.tables[0].items[0].account.samples == 2 * len(TIME)
+
+
+ANGLES = {
+    "45,,,90,,": [45, 45, 45, 90, 90, 90],
+    "45,45,45,90,90,90": [45, 45, 45, 90, 90, 90],
+    "45,,45,90,,90": None,  # a filled row follows no blank one: cells are missing
+    ",45,,90,,": None,
+    "45,,,,,": None,  # one block only
+    "45,45,,90,90,90": None,
+}
+
+
+@pytest.mark.parametrize(("cells", "angles"), ANGLES.items())
+def test_merged_angles_are_filled_down_and_missing_ones_refused(tmp_path, cells, angles):
+    rows = [f"{angle},{20 + i},{15 + i}" for i, angle in enumerate(cells.split(","))]
+    path = write(tmp_path, "\n".join(["wrap_angle_deg,input_force_N,output_force_N", *rows]) + "\n")
+    if angles is None:
+        with pytest.raises(bf.DatasetError, match="the cell is blank"):
+            bf.read(path)
+        return
+    data = bf.read(path)
+    np.testing.assert_allclose(np.rad2deg(data.measurements.tables[0].own.angle[:, 0]), angles)
+    assert ("merged" in " ".join(data.measurements.remarks)) == (",," in cells)

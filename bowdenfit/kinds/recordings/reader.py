@@ -19,7 +19,7 @@ from bowdenfit.kinds.recordings.locations import locate_by_channels, location_na
 from bowdenfit.kinds.rows import OwnAngles, RowConditions, unify_labels
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.angle_channels import refuse_other_angle
-from bowdenfit.recordings.forces import to_recording
+from bowdenfit.recordings.forces import separate_joined_clocks, to_recording
 from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED, rows_where
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
@@ -227,6 +227,8 @@ def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
         is_loop=description.cable.kind == "loop",
         output_file=output_rows[0] if output_rows else None,
     )
+    raw, joined = separate_joined_clocks(raw)
+    remarks += joined
     sensors = description.sensors
     if (sensors.input_ratio, sensors.output_ratio) != (1.0, 1.0):
         forces = raw.input_force * sensors.input_ratio, raw.output_force * sensors.output_ratio

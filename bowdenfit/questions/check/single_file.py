@@ -121,10 +121,13 @@ def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading
     """Describe a recording alone; and return whether it can be fitted as it stands."""
     (command,) = make_commands(file)
     missing = reading.get("missing", ())
-    stated, recordings, obstacle = ANY_ANGLE if file.angle is None else (file.angle.angle, "rad"), None, ""
+    stated = ANY_ANGLE if file.angle is None else (file.angle.angle, "rad")
+    recordings, obstacle, notes = None, "", list[str]()
     try:
         data = single_file_dataset(file.path, stated, (), file.named, kind="recordings", missing=missing)
         recordings = data.measurements.table(Recordings)
+        of_rows = [remark for account in data.accounts for remark in account.remarks]
+        notes = [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in of_rows]
     except DatasetError as error:
         obstacle = str(error)
     backwards = describe_backward_clock(recording) if obstacle and "backwards" not in obstacle else ""
@@ -133,7 +136,8 @@ def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading
     description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
     source = f"({recording.kind}, {counted(len(recording.channels), 'channel')})"
     lines = [filled(f"{file.path.name}: {description}, because {file.kind.why} {source}."), ""]
-    lines += [*describe_channels(recording), *describe_recorded(recordings, obstacle), ""]
+    lines += [*describe_channels(recording), *describe_recorded(recordings, obstacle)]
+    lines += [*(note for note in notes if note not in lines), ""]
     lines += describe_commands([command.with_options("--missing", missing)], usable)
     lines += ["Several recordings of one cable go into a cable.toml (bowdenfit init)."]
     return "\n".join(lines) + "\n", not obstacle

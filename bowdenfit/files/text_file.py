@@ -218,7 +218,7 @@ def _encoding(data: bytes, name: str, whole: bool) -> tuple[str, int]:
     for mark, encoding in _BYTE_ORDER_MARKS:
         if data.startswith(mark):
             return encoding, len(mark)
-    if b"\x00" in data:
+    if b"\x00" in data or data.startswith(b"\x89"):  # with which HDF5 and PNG begin, and no text
         raise DatasetError(
             f"{name} is not a text file; name the file by its format (.xlsx, .mat, .tdms, ...) or export it as CSV."
         )

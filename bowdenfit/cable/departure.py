@@ -10,7 +10,7 @@ References:
     Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), equation 4.17, for the process.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
 import jax.numpy as jnp
@@ -23,10 +23,19 @@ SMOOTH_SHARES: Mapping[int, float] = MappingProxyType({1: 0.26, 2: 0.115, 3: 0.0
 """Share of the process's whole variance of the polynomial of each degree; that of the constant is the rest."""
 
 
-def smooth_functions(z: Float[Array, " rows"], degrees: Mapping[int, float]) -> Float[Array, "rows functions"]:
-    """Legendre polynomials with a mean square of 1 over the range at z, -1 to 1 there; outside as at its nearer end."""
+def smooth_functions(z: Float[Array, " rows"], degrees: Collection[int]) -> Float[Array, "rows functions"]:
+    """Legendre polynomials with a mean square of 1 over the range at z, -1 to 1 there; outside as at its nearer end.
+
+    Args:
+        z: Route variable, -1 to 1 over the range [1].
+        degrees: Degrees of the polynomials, 1 to 5.
+    """
     z = jnp.clip(z, -1.0, 1.0)
-    polynomials = [jnp.ones_like(z), z]
-    for n in range(1, max(degrees)):
-        polynomials.append(((2 * n + 1) * z * polynomials[n] - n * polynomials[n - 1]) / (n + 1))
+    polynomials = {
+        1: z,
+        2: (3 * z**2 - 1) / 2,
+        3: (5 * z**3 - 3 * z) / 2,
+        4: (35 * z**4 - 30 * z**2 + 3) / 8,
+        5: (63 * z**5 - 70 * z**3 + 15 * z) / 8,
+    }
     return jnp.stack([jnp.sqrt(2 * degree + 1.0) * polynomials[degree] for degree in degrees], axis=-1)

@@ -77,8 +77,8 @@ def test_a_unit_in_each_row_converts_its_number_and_one_that_measures_something_
     assert (table.header, table.units) == (("Fin", "Fout"), ("N", "N"))
     assert [row[0].number() for row in table.rows] == pytest.approx([200.0, 1002.1, 400.0])
     assert bf.read(write(tmp_path, text), wrap_angle="180deg").measurements.tables
-    for wrong, what in (("0.4,mm", "another unit"), ("0.4,", "has no unit")):
-        with pytest.raises(bf.DatasetError, match=what):
+    for wrong, message in (("0.4,mm", "another unit"), ("0.4,", "has no unit")):
+        with pytest.raises(bf.DatasetError, match=message):
             bf.read(write(tmp_path, text.replace("0.4,kN", wrong)), wrap_angle="180deg")
     with pytest.raises(bf.DatasetError, match="appears twice"):
         read_table(write(tmp_path, "Fin (N),Note,Fout (N),Note\n20,a,14,b\n40,a,28,b\n"))

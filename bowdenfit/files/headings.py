@@ -23,6 +23,7 @@ _SUFFIXES = (
     "N kN mN lbf kgf gf ozf newton Nm Nmm mNm N*m N*mm V mV uV mV/V V/V mA Pa kPa MPa bar psi kg mm cm m um inch mm/s m/s "
     "cm/s rad deg degree degrees rad/s deg/s rpm s ms us ns min h sec seconds Hz"
 )
+_PER_SECOND = {"mm_s", "cm_s", "m_s", "rad_s", "deg_s"}  # nobody measures the products
 _REPEATED = re.compile(r"(?P<first>.+)\.\d{1,2}")
 _FORCES = {"N", "kN", "mN", "lbf", "kgf"}
 _LONGEST_HEADING = 200  # characters; judged: a longer text is a sentence, and patterns would take long over it
@@ -86,13 +87,18 @@ def heading_of(text: str, unit: str = "") -> Heading:
 
 
 def _unit_behind(heading: str) -> str:
-    """Return the unit in `input_force_N`, `velocity_mm_per_s`, "Force N" or `force_N_45deg_trial1`."""
+    """Return the unit in `input_force_N`, `velocity_mm_s`, "Force N" or `force_N_45deg_trial1`."""
     words = re.split(r"[\s_]+", heading)
     for start in range(1, len(words)):
-        candidate = "_".join(words[start:]).replace("_per_", "/")
+        candidate = _read_quotient("_".join(words[start:]))
         if candidate in _SUFFIXES.split():
             return candidate
     return next((word for word in words[1:] if word in _FORCES), "")
+
+
+def _read_quotient(words: str) -> str:
+    """Return a unit with its line: `mm_per_s` and `mm_s` are mm/s."""
+    return words.replace("_", "/") if words in _PER_SECOND else words.replace("_per_", "/")
 
 
 def split_brackets(heading: str) -> tuple[str, str]:
@@ -192,7 +198,7 @@ def _unit_suffix(heading: str, name: str) -> str | None:
     units = ["_".join(words[i:]) for i in range(1, len(words)) if plain_name("_".join(words[:i])) == plain_name(name)]
     if not units:
         return None
-    candidate = units[-1].replace("_per_", "/").replace("_", "*")
+    candidate = _read_quotient(units[-1]).replace("_", "*")
     if candidate.lower() in {"pct", "percent"}:
         return "%"
     return candidate if is_unit(candidate) else None

@@ -21,9 +21,7 @@ BELL, NO_FAMILY = "gaussian", "smooth"
 
 
 def propose_curve(route: Route, lengths: Vector, angles: Vector) -> str:
-    """Return the curve to propose: a bell unless another family predicts angles left out surely better, then a smooth curve.
-
-    Surely is by more than one standard error of the difference of squared errors, summed over the readings.
+    """Return the curve to propose: a bell if of all curves it predicts angles left out best, else a smooth curve.
 
     Args:
         route: Route variable and its range; readings outside are left out.
@@ -34,9 +32,8 @@ def propose_curve(route: Route, lengths: Vector, angles: Vector) -> str:
     if np.isfinite(angles[inside]).sum() <= CURVES[BELL].coefficients:
         return BELL
     errors = leave_one_out_errors(route, lengths[inside], angles[inside])
-    better = [errors[BELL] ** 2 - errors[family] ** 2 for family in CURVES if family != BELL]
-    surely = [np.sum(gain) > np.sqrt(len(gain)) * np.std(gain, ddof=1) for gain in better]
-    return NO_FAMILY if any(surely) else BELL
+    squares = {family: float(np.sum(error**2)) for family, error in errors.items()}
+    return BELL if squares[BELL] == min(squares.values()) else NO_FAMILY
 
 
 def leave_one_out_errors(route: Route, lengths: Vector, angles: Vector) -> Mapping[str, Vector]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError
+from bowdenfit.files import serial_log
 from bowdenfit.files.cells import MISSING
 from bowdenfit.files.channels import (
     ChannelFile,
@@ -112,6 +113,8 @@ def read(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, too large, no text, has no rows of numbers, or a cell among numbers is
             text.
     """
+    if serial_log.is_serial_log(path):
+        return serial_log.read(path)
     data = first_bytes(path, _FIRST_BYTES)
     refuse_larger(path, LARGEST_BYTES, "convert it to Parquet with the needed columns only, or cut it into runs")
     sheet = read_start(path, data)

@@ -13,6 +13,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import is_date, names_time, stated_rate
 from bowdenfit.files.formats import TEXT
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of
+from bowdenfit.files.serial_log import is_serial_log
 from bowdenfit.files.spellings import parse_heading, without_accents
 from bowdenfit.files.tables import WORKBOOKS, RawTable, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
@@ -129,6 +130,8 @@ def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str]
         return FileKind(
             "recordings", f"files with the ending {path.suffix or '(none)'} are those of acquisition programs"
         )
+    if path.suffix.lower() in TEXT and is_serial_log(path):
+        return FileKind("recordings", "its lines have numbers behind the same keys, as logs of a serial line do")
     try:
         table = read_table(path, HEAD)
     except DatasetError as error:

@@ -6,6 +6,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.files import read_channels
 from bowdenfit.files.cells import parse_number
+from bowdenfit.files.serial_log import is_serial_log, split_line
 from bowdenfit.files.tables import read_table
 
 pytestmark = pytest.mark.extended
@@ -141,3 +142,38 @@ def test_merged_angles_are_filled_down_and_missing_ones_refused(tmp_path, cells,
     data = bf.read(path)
     np.testing.assert_allclose(np.rad2deg(data.measurements.tables[0].own.angle[:, 0]), angles)
     assert ("merged" in " ".join(data.measurements.remarks)) == (",," in cells)
+
+
+@pytest.mark.parametrize(
+    ("line", "headings", "numbers"),
+    [
+        ("1203\tF1:39.84\tF2:27.17", ("", "F1", "F2"), ["1203", "39.84", "27.17"]),
+        ("10:01:20.000 -> t=1203 F1=39.96 F2=27.49", ("t", "F1", "F2"), ["1203", "39.96", "27.49"]),
+        ("10:01:20.000 -> F1:39.96,F2:-1.5e-3", ("Time", "F1", "F2"), ["10:01:20.000", "39.96", "-1.5e-3"]),
+        ("F1: 39.84 N, F2: 27.17 N", ("F1 (N)", "F2 (N)"), ["39.84", "27.17"]),
+        ("F1: nan F2: 27.17", ("F1", "F2"), ["nan", "27.17"]),
+        ("WARN: HX711 timeout", (), []),
+        ("rst:0x1 (POWERON_RESET),boot:0x13", (), []),
+        ("1203,39.84,27.17", (), []),
+        ("10:01:20;39.84;27.17", (), []),
+        ("F1:39.84 F2:", (), []),
+        ("F1:39.84 F2:27.1x7", (), []),
+    ],
+)
+def test_a_line_of_a_serial_log_has_nothing_but_numbers_with_keys(line, headings, numbers):
+    assert split_line(line) == (headings, numbers)
+
+
+def test_a_log_with_keys_is_a_recording_and_a_table_under_lines_with_keys_is_none(run, tmp_path):
+    rows = [f"t={1000 * t:.0f} F1={a:.2f} F2={b:.2f}" for t, a, b in zip(TIME, INPUT, OUTPUT, strict=True)]
+    rows[100] = "tare"
+    rows[200] = rows[200][:-9]  # of which a part was lost
+    path = write(tmp_path, "\n".join(["boot ok", *rows]) + "\n")
+    file = read_channels(path)
+    assert [len(channel.values) for channel in file.channels] == [len(TIME) - 2] * 3
+    assert file.account.accounted == file.account.rows == len(TIME) + 1
+    assert "'tare' in row 102" in " ".join(file.remarks)
+    code, out, _ = run("check", path)
+    assert code == 2 and "input_force=F1:N" in out and "time=t:ms" in out
+    above = "Rate: 20\nGain: 3\n" + TABLE
+    assert not is_serial_log(write(tmp_path, above)) and len(read_table(tmp_path / "log.csv").rows) == 3

@@ -15,7 +15,7 @@ from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, make_account
 from bowdenfit.files.sheet_columns import SheetRows, cell_text, make_channels, read_arrays
 from bowdenfit.files.tables import RawTable, make_table
 from bowdenfit.files.text_file import CsvRecord, Line
-from bowdenfit.words import quoted, shown
+from bowdenfit.words import listed, quoted, shown
 
 LARGEST_BYTES = 1 << 28
 _FIRST_ROWS = 300  # judged: in which headings and the first data must stand
@@ -107,6 +107,7 @@ def read_workbook(path: Path, most: int | None = None) -> RawTable:
     openpyxl = load_library("openpyxl", ".xlsx")
     refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
     tables: dict[str, RawTable] = {}
+    filled = list[str]()
     errors: list[DatasetError] = []
     for title, rows in iterate_sheets(openpyxl, path):
         cells = [[cell_text(cell).strip() for cell in row] for row in islice(rows, most)]
@@ -116,12 +117,16 @@ def read_workbook(path: Path, most: int | None = None) -> RawTable:
         lines = [Line(record.row, 0, " ".join(record.cells) + "\n") for record in records]
         try:
             if not all(record.blank for record in records):
+                filled.append(title)
                 tables[title] = make_table(path.name, lines, records, ";")
         except DatasetError as error:
             errors.append(error)
     by_headings = {title: table for title, table in tables.items() if _has_forces(table)} or tables
     if len(by_headings) == 1:
-        return next(iter(by_headings.values()))
+        ((sheet, table),) = by_headings.items()
+        unread = [shown(title) for title in filled if title != sheet]
+        note = f"of its sheets only {shown(sheet)} is read, and {listed(unread)} {'is' if len(unread) == 1 else 'are'} not"
+        return replace(table, lines=replace(table.lines, note=note)) if unread else table
     if not tables and errors:
         raise errors[0]
     what = (

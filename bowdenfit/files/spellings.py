@@ -77,6 +77,7 @@ _SPREAD = re.compile(  # standard deviations alone: an error or an uncertainty m
     re.IGNORECASE,
 )
 _NUMBERED = re.compile(r"[tf]_?(?P<number>[12])|tension ?(?P<of>[12])")
+_LENGTH_WORDS = re.compile(r"length|lange|laenge|longueur|longitud|lunghezza")
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,11 @@ def _end_of(words: Iterable[str], unit: str) -> tuple[str, str] | None:
 
 def _may_be_force(unit: str) -> bool:
     return not unit or bool(weight_of(unit)) or dimension_of(unit) == "force"
+
+
+def names_length(heading: str) -> bool:
+    """Return whether a heading says that it is a length, in one of five languages."""
+    return bool(_LENGTH_WORDS.search(without_accents(heading).lower()))
 
 
 def without_accents(text: str) -> str:

@@ -20,7 +20,7 @@ from bowdenfit.files.clocks import is_clock, names_time
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming, plain_name, split_brackets
 from bowdenfit.files.layout import is_index
 from bowdenfit.files.missing_codes import MissingCodes
-from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, parse_heading
+from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, names_length, parse_heading
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import HEAD, FileKind, guess_file_kind, read_numbers
@@ -193,6 +193,15 @@ class LoneFile:
                 unwritten = likely_angle_unit(column.name, column.high, column.are_whole) or None
                 likely[column.name] = "" if spelling.unit else unwritten
         return likely
+
+    @property
+    def lengths(self) -> int:
+        """At how many lengths its rows were read; 0 where a table has no such column or says its wrap angles itself."""
+        if self.table is None or self.wrap_angle_heading or WRAP_ANGLE.name in self.named or self.likely_wrap_angles:
+            return 0
+        columns = [column for column in self.numbers if column.dimension == "length" and names_length(column.name)]
+        counts = [len(np.unique(column.finite)) for column in columns]
+        return counts[0] if len(counts) == 1 and counts[0] > 1 else 0
 
     @property
     def wrap_angle_heading(self) -> str:

@@ -1,6 +1,7 @@
 """Layouts that laboratories have sent, each beside a twin that must be read, or refused, as before."""
 
 import numpy as np
+import openpyxl
 import pytest
 
 import bowdenfit as bf
@@ -177,3 +178,17 @@ def test_a_log_with_keys_is_a_recording_and_a_table_under_lines_with_keys_is_non
     assert code == 2 and "input_force=F1:N" in out and "time=t:ms" in out
     above = "Rate: 20\nGain: 3\n" + TABLE
     assert not is_serial_log(write(tmp_path, above)) and len(read_table(tmp_path / "log.csv").rows) == 3
+
+
+def test_sheets_that_are_not_read_are_named_and_a_workbook_of_one_says_nothing(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.title = "Kraft"
+    for row in (["Fin (N)", "Fout (N)"], [20, 14.1], [40, 28.0]):
+        book.active.append(row)
+    book.create_sheet("leer")
+    book.save(tmp_path / "one.xlsx")
+    assert read_table(tmp_path / "one.xlsx").lines.note == ""
+    for row in (["Länge [mm]", "Winkel [deg]"], [300, 80], [400, 90]):
+        book["leer"].append(row)
+    book.save(tmp_path / "two.xlsx")
+    assert read_table(tmp_path / "two.xlsx").lines.note == "of its sheets only 'Kraft' is read, and 'leer' is not"

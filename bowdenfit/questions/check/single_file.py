@@ -1,6 +1,8 @@
 """What `bowdenfit check FILE` says of a file alone: what it is, its columns or channels, and the command that fits it."""
 
+import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
@@ -12,7 +14,9 @@ from bowdenfit.files import read_channels
 from bowdenfit.files.apart import limits_times
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock
+from bowdenfit.files.formats import TEXT
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
+from bowdenfit.files.tables import WORKBOOKS
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.file_kind import columns_of_kind, is_angle_table
 from bowdenfit.kinds.fit_command import FitCommand, make_commands
@@ -35,6 +39,7 @@ ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command propose
 _LEFT = ("column", "unit", "read as")  # columns aligned to the left
 _MAX_NAMED = 8  # channels whose first and last sample are named
 _LONG = 50  # rows from which a table beside a clock is meant as a recording; with fewer its clock may say when each was read
+_MOST_NEIGHBORS = 40  # files of a folder that are looked at; a judgement
 _MAX_LISTED = 100  # channels that are listed
 _MAX_LENGTH = 60  # characters of a name or unit
 _CHANNEL_HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
@@ -91,6 +96,34 @@ def _describe_readings(file: LoneFile, reading: Reading) -> tuple[str, bool]:
     return _describe_table(file, [command], data, obstacle, not remaining), not obstacle
 
 
+def _find_neighbors(path: Path, angles: bool) -> list[Path]:
+    """Return the tables next to a file that hold wrap angles by length, or else readings at several lengths."""
+    neighbors = list[Path]()
+    for other in sorted(path.parent.iterdir())[:_MOST_NEIGHBORS]:
+        if other != path and other.is_file() and other.suffix.lower() in (*TEXT, *WORKBOOKS):
+            with suppress(BowdenfitError):
+                file = understand(other, is_whole=False)
+                fits = file.table is not None and is_angle_table(file.table) if angles else bool(file.lengths)
+                neighbors += [other] if fits else []
+    return neighbors
+
+
+def _describe_init(files: Sequence[Path]) -> str:
+    """Return the command that writes a data set of several files, as it can be pasted."""
+    return f"  bowdenfit init my-cable --from {' '.join(shlex.quote(str(file)) for file in files)}"
+
+
+def _describe_lengths(file: LoneFile) -> list[str]:
+    """Describe that wrap angles may differ between the lengths of a table, and the command that fits it then."""
+    if not file.lengths:
+        return []
+    angles = _find_neighbors(file.path, angles=True)
+    table = f"{angles[0].name} has them" if angles else "write those measured at each length into a table such as angles.csv"
+    words = f"Its rows are at {file.lengths} lengths. If the wrap angle differs between them, {table}"
+    first = angles[0] if angles else file.path.with_name("angles.csv")
+    return [filled(f"{words}, and both are fitted together:"), _describe_init([first, file.path]), ""]
+
+
 def _describe_angle_table(file: LoneFile) -> str:
     """Describe a table of wrap angles by length, and where it belongs."""
     assert file.table is not None
@@ -100,6 +133,8 @@ def _describe_angle_table(file: LoneFile) -> str:
     )
     title = f"{file.path.name}: a table of wrap angles at {counted(len(file.table.rows), 'length')}."
     lines = [title, "", _column_table(file, ()), "", *describe_row_account(file.table.lines), "", filled(place)]
+    if readings := _find_neighbors(file.path, angles=False):
+        lines += ["", "To write it for these files:", _describe_init([file.path, *readings])]
     return "\n".join(lines) + "\n"
 
 
@@ -188,7 +223,7 @@ def _describe_table(
         lines += [filled(f"Warning: {sentence}") for sentence in describe_unusable_readings(data)]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
-    return "\n".join([*lines, "", *describe_commands(commands, usable)]) + "\n"
+    return "\n".join([*lines, "", *_describe_lengths(file), *describe_commands(commands, usable)]) + "\n"
 
 
 def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> list[str]:

@@ -11,7 +11,7 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.files.headings import Quantity
-from bowdenfit.files.spellings import without_accents
+from bowdenfit.files.spellings import names_length
 from bowdenfit.kinds.file_kind import find_stated_angle
 from bowdenfit.questions.start.curve_choice import NO_FAMILY, propose_curve
 from bowdenfit.questions.start.measured_file import (
@@ -36,7 +36,6 @@ from bowdenfit.units import conversion_factor
 from bowdenfit.words import listed, quoted, shown
 
 _WRAP_ANGLE, _LENGTH = "wrap_angle", "cable_length"  # columns of tables where headings give no name of their own
-_LENGTH_WORDS = re.compile(r"length|lange|laenge|longueur|longitud|lunghezza")  # in headings, of five languages
 _ANGLE_WORDS = re.compile(
     r"\b(?:wrap|bend|angles?|winkel|umschlingungswinkel|biegewinkel|angulo|angolo)\b|_", re.IGNORECASE
 )
@@ -229,7 +228,7 @@ def _assign_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> Non
         )
     reason = f"{file.name} does not say which of its columns is the length; name it as in the table of wrap angles."
     matching = file.columns_for(layout.length_quantity) or [
-        column for column in options if _LENGTH_WORDS.search(without_accents(column.name).lower())
+        column for column in options if names_length(column.name)
     ]
     assign_column(
         file,

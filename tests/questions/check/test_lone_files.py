@@ -336,3 +336,18 @@ def test_without_a_column_that_could_be_a_force_there_is_no_command(run, tmp_pat
     path = write(tmp_path, ("time (s)", "Fin (N)"), recorded()[:2])
     code, out, _ = run("check", path)
     assert code == 2 and command(out) == [] and "No column is left that could be the output_force" in out
+
+
+def test_readings_at_several_lengths_are_proposed_to_init_with_the_table_of_angles(run, tmp_path):
+    lengths, load = np.repeat([300, 400, 500], 2), np.tile([20.0, 40.0], 3)
+    headings = ("Länge [mm]", "Kraft Eingang [N]", "Kraft Ausgang [N]")
+    forces = write(tmp_path, headings, (lengths, load, 0.7 * load), "forces.csv")
+    code, out, _ = run("check", forces)
+    assert code == 0 and "Its rows are at 3 lengths." in out
+    assert f"bowdenfit init my-cable --from {tmp_path / 'angles.csv'} {forces}" in out
+    angles = write(tmp_path, ("Länge [mm]", "Winkel [deg]"), ([300, 400, 500], [80, 100, 130]), "winkel.csv")
+    for path in (forces, angles):
+        assert f"bowdenfit init my-cable --from {angles} {forces}" in run("check", path)[1]
+    columns = (lengths, 0 * lengths + 90, load, 0.7 * load)
+    own = write(tmp_path, ("Länge [mm]", "wrap_angle_deg", "Fin (N)", "Fout (N)"), columns)
+    assert "bowdenfit init" not in run("check", own)[1]

@@ -1,8 +1,6 @@
 """One clock for a recording whose input and output were logged by two loggers, each with a clock of its own.
 
-The shift between the clocks is looked for with the play operator: the output that it predicts from the input is compared with
-the measured one at every shift, for friction exponents from none to the largest at which the output still moves. The lag of a
-plain correlation would be off by a part of a stroke, because the output stands still after each reversal of the input.
+The shift between the clocks is looked for with the play operator (`preparation.shift_scan`).
 
 The best shift starts `preparation.delay`, which refines it and gives its standard error, as for two channels of one file.
 A shift at which the output follows the input is only taken where no other fits nearly as well: periodic motion repeats.
@@ -15,29 +13,15 @@ import numpy as np
 
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.pieces import subsample
 from bowdenfit.recordings.forces import FEW_SAMPLES
 from bowdenfit.recordings.preparation import delays_of_parts, inspect_recording
-from bowdenfit.recordings.preparation.blocks import main_frequency
 from bowdenfit.recordings.preparation.checks import check_channels, check_sign
-from bowdenfit.recordings.preparation.delay import RANGE, Delay
-from bowdenfit.recordings.preparation.segments import play_along_rows
+from bowdenfit.recordings.preparation.delay import Delay
+from bowdenfit.recordings.preparation.shift_scan import AS_WELL, OVERLAP, ShiftScan, scan_shifts
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.types import OtherVector, Vector
 
-_STEP = 0.005  # [s] between points, at least
 _MOST_POINTS = 1 << 18  # of the longer recording; a day at three points a second
-_EXPONENTS = np.linspace(0.0, 0.45, 12)  # over the range of log input force; at half of it the output stands still
-_STARTS = np.array([-1.0, 0.0, 1.0])  # where in its band the rope may be at the start, in friction exponents
-_LEAST_FORCE = 1e-3  # of the largest, below which a rope is slack
-_WILD = 1e-3  # share of the forces at each end that may be spikes
-_OVERLAP = 0.5  # judged: share of the shorter recording that must lie within the other
-_MOVES = 0.3  # judged: of the output's variance, which the part in common must have at least
 _UNLIKE = 0.2  # judged: share of the output's variance that no shift explains where the two do not belong together
-# Ratio of what two shifts leave unexplained, up to which they fit about as well: over 2 to 100 cycles of 3 s, with pauses that
-# one logger or both saw and noise of 0.3 or 3 % of the load, shifts that a pause does not tell apart differed by 1.3 times at
-# most, and the others by 2 to 280 times.
-_AS_WELL = 3.0
 _FEWEST_PARTS, _MOST_PARTS = 8, 24  # judged: of a recording, whose delays tell how fast the output's clock runs
 _PART = 25.0  # [s]; as much as is looked at for a delay
 _CLEAR_DRIFT = 4.5  # standard errors; four in a thousand steady clocks by Student's t with 6 degrees of freedom
@@ -79,44 +63,6 @@ class ClockShift:
         ppm = 1e6 * self.rate
         drift = f"; it runs {abs(ppm):.3g} ppm {'fast' if ppm > 0 else 'slow'}, which was corrected" if ppm else ""
         return f"{raw.file}: {origin}{drift}."
-
-
-@dataclass(frozen=True)
-class _Scan:
-    """How well the output follows the input at each shift of its clock.
-
-    Args:
-        shift: What is added to the output's times [s].
-        unexplained: Share of the output's variance that the input leaves unexplained; 1 where the two share too little.
-        near: Shifts that differ by less are of one fit [s].
-    """
-
-    shift: Vector
-    unexplained: Vector
-    near: float
-
-    def best_near(self, shift: float) -> tuple[float, float]:
-        """Return the best shift near another, and what it leaves unexplained."""
-        off = np.where(np.abs(self.shift - shift) <= self.near, self.unexplained, np.inf)
-        best = int(np.argmin(off))
-        return float(self.shift[best]), float(off[best])
-
-    @property
-    def best(self) -> tuple[float, float]:
-        """The best shift, and what it leaves unexplained."""
-        best = int(np.argmin(self.unexplained))
-        return float(self.shift[best]), float(self.unexplained[best])
-
-    def rival(self) -> float | None:
-        """Return another shift that fits about as well as the best, with worse ones between them; None if there is none."""
-        as_well = self.unexplained < _AS_WELL * self.best[1]
-        best, worse = int(np.argmin(self.unexplained)), np.flatnonzero(~as_well)
-        at = int(np.searchsorted(worse, best))
-        first, last = (worse[at - 1] + 1 if at else 0), (worse[at] if at < len(worse) else len(as_well))
-        as_well[first:last] = False
-        as_well &= np.abs(self.shift - self.shift[best]) > self.near
-        others = np.flatnonzero(as_well)
-        return float(self.shift[others[np.argmin(self.unexplained[others])]]) if len(others) else None
 
 
 def align_clocks(
@@ -203,7 +149,7 @@ def _align_by_forces(raw: RawRecording, settings: Preparation) -> tuple[RawRecor
             f"{raw.file}: a delay is stated, but the shift between the clocks of the two loggers, which contains it, is not. "
             'State it, clock_shift = { value = ..., unit = "s" }, or write delay = "estimated".'
         )
-    scan = _scan_shifts(raw, settings)
+    scan = _scan(raw, settings)
     value, off = scan.best
     if off > _UNLIKE:
         raise DatasetError(
@@ -228,12 +174,12 @@ def _refine(raw: RawRecording, shift: ClockShift, what: str, settings: Preparati
     Raises:
         DatasetError: Another does.
     """
-    scan = _scan_shifts(raw, settings)
+    scan = _scan(raw, settings)
     best, least = scan.best
     value, off = scan.best_near(shift.value)
     if least > _UNLIKE:
         return shift  # the forces do not tell
-    if off > _AS_WELL * least:
+    if off > AS_WELL * least:
         known = date_shift(raw)
         raise DatasetError(
             f"{raw.file}: by {what} the output's clock is to be shifted by {shift.value - known:+.3f} s, but the forces fit "
@@ -252,7 +198,7 @@ def _refuse_short_overlap(raw: RawRecording, shift: float, what: str) -> None:
     """
     ends = (raw.input_time[0], raw.input_time[-1]), (raw.output_time[0] + shift, raw.output_time[-1] + shift)
     common = min(ends[0][1], ends[1][1]) - max(ends[0][0], ends[1][0])
-    if common < _OVERLAP * min(float(np.ptp(raw.input_time)), float(np.ptp(raw.output_time))):
+    if common < OVERLAP * min(float(np.ptp(raw.input_time)), float(np.ptp(raw.output_time))):
         shared = f"overlap for only {common:.4g} s" if common > 0 else "do not overlap"
         raise DatasetError(
             f"{raw.file}: by {what} the input was recorded from {ends[0][0]:.10g} to {ends[0][1]:.10g} s and the output from "
@@ -268,86 +214,12 @@ def _shifted(raw: RawRecording, shift: ClockShift) -> RawRecording:
     return replace(raw, output_time=raw.output_time + shift.value)
 
 
-def _scan_shifts(raw: RawRecording, settings: Preparation) -> _Scan:
+def _scan(raw: RawRecording, settings: Preparation) -> ShiftScan:
     """Compare the output with what the play operator makes of the input, at every shift."""
     for name, force in (("input_force", raw.input_force), ("output_force", raw.output_force)):
         if settings.tare != "interval":
             check_sign(raw.file, name, force)
-    longest = max(float(np.ptp(raw.input_time)), float(np.ptp(raw.output_time)))
-    usual = [float(np.median(np.diff(subsample(time)))) for time in (raw.input_time, raw.output_time)]
-    step = max(_STEP, longest / _MOST_POINTS, *usual)
-    x, is_x = _average(raw.input_time, raw.input_force, step)
-    y, is_y = _average(raw.output_time, raw.output_force, step)
-    log_input = np.log(np.maximum(x, _LEAST_FORCE * np.max(x)))
-    explained = np.zeros(len(x) + len(y) - 1)
-    reference = _Reference.of(is_x, y, is_y)
-    rows = np.repeat(log_input[None], len(_STARTS), axis=0)
-    for exponent in _EXPONENTS * np.ptp(log_input):
-        for output in play_along_rows(rows, log_input[0] + exponent * _STARTS, np.array([exponent]))[0]:
-            explained = np.maximum(explained, reference.explained_by(np.exp(output)))
-    lags = np.arange(len(explained)) - (len(x) - 1)
-    common = np.minimum(len(x), len(y) - lags) - np.maximum(0, -lags)
-    unexplained = np.where(common >= _OVERLAP * min(len(x), len(y)), 1 - explained, 1.0)
-    main = main_frequency(x, x, 1 / step)
-    near = max(RANGE, 0.25 / main) if main > 0 else RANGE
-    return _Scan(raw.input_time[0] - raw.output_time[0] - lags * step, unexplained, near)
-
-
-def _average(time: OtherVector, force: OtherVector, step: float) -> tuple[Vector, Vector]:
-    """Return means of the force on a coarse clock from its first sample, without wild readings, and which points have any."""
-    there = np.isfinite(force)
-    forces = np.clip(force, *np.quantile(subsample(force[there]), (_WILD, 1 - _WILD)))
-    place = ((time - time[0]) / step).astype(int)
-    count = np.bincount(place[there], minlength=place[-1] + 1)
-    total = np.bincount(place[there], forces[there], minlength=place[-1] + 1)
-    known = np.flatnonzero(count)
-    return np.interp(np.arange(len(count)), known, total[known] / count[known]), (count > 0).astype(float)
-
-
-@dataclass(frozen=True)
-class _Reference:
-    """A measured output with which predictions are compared at every lag, by transforms.
-
-    Args:
-        is_x: Points of the input that are known.
-        size: Size of the transforms.
-        of_output: Transforms of the output's weight, and of that times the output.
-        count: Points in common at each lag.
-        mean, variance: Of the output in these, in units of its standard deviation.
-        enough: Whether that is enough, and moves.
-    """
-
-    is_x: np.ndarray
-    size: int
-    of_output: tuple[np.ndarray, np.ndarray]
-    count: np.ndarray
-    mean: np.ndarray
-    variance: np.ndarray
-    enough: np.ndarray
-
-    @classmethod
-    def of(cls, is_x: np.ndarray, y: np.ndarray, is_y: np.ndarray) -> "_Reference":
-        """Return the reference for an input whose points are known where `is_x` is 1."""
-        length = len(is_x) + len(y) - 1
-        size = 1 << length.bit_length()
-        y = (y - np.mean(y)) / np.std(y)
-        of_weight, of_first, of_second = (np.fft.rfft(column, size) for column in (is_y, is_y * y, is_y * y**2))
-        of_input = np.fft.rfft(is_x[::-1], size)
-        n, first, second = (np.fft.irfft(of_input * of, size)[:length] for of in (of_weight, of_first, of_second))
-        n = np.maximum(n, 1.0)
-        variance = second / n - (first / n) ** 2
-        enough = (variance > _MOVES) & (n > 0.5 * _OVERLAP * min(len(is_x), len(y)))
-        return cls(is_x, size, (of_weight, of_first), n, first / n, variance, enough)
-
-    def explained_by(self, predicted: np.ndarray) -> np.ndarray:
-        """Return the squared correlation with a predicted output at each lag; 0 where it is negative or not enough is known."""
-        scaled = (predicted - np.mean(predicted)) / max(float(np.std(predicted)), 1e-300)
-        of_first, of_second = (np.fft.rfft((self.is_x * column)[::-1], self.size) for column in (scaled, scaled**2))
-        products = of_first * self.of_output[0], of_second * self.of_output[0], of_first * self.of_output[1]
-        first, second, both = (np.fft.irfft(product, self.size)[: len(self.count)] / self.count for product in products)
-        covariance = both - first * self.mean
-        variance = np.maximum((second - first**2) * self.variance, 1e-9)
-        return np.where(self.enough & (covariance > 0), covariance**2 / variance, 0.0)
+    return scan_shifts(raw.input_time, raw.input_force, raw.output_time, raw.output_force, _MOST_POINTS)
 
 
 def _correct_drift(raw: RawRecording, settings: Preparation, shift: ClockShift) -> tuple[RawRecording, ClockShift]:

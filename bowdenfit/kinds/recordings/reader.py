@@ -22,7 +22,7 @@ from bowdenfit.recordings.angle_channels import refuse_other_angle
 from bowdenfit.recordings.forces import separate_joined_clocks, to_recording
 from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED, rows_where
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
-from bowdenfit.recordings.preparation.delay import COMMON_ERROR
+from bowdenfit.recordings.preparation.delay import COMMON_ERROR, RANGE
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 from bowdenfit.recordings.two_loggers import ClockShift, align_clocks, check_determined
@@ -119,7 +119,8 @@ def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]]
     inspections = [inspect_recording(f.raw, f.settings) for f in files]
     pairs = list(zip(files, inspections, strict=True))
     delays = [i.delay for f, i in pairs if not f.shift and i.settings.delay == "estimated" and i.delay.sd > 0]
-    pooled = _pool_delays(np.array([d.value for d in delays]), np.array([d.sd for d in delays])) if delays else None
+    values, sds_of_delays = np.array([d.value for d in delays]), np.array([d.sd for d in delays])
+    pooled = _pool_delays(values, sds_of_delays) if delays and np.ptp(values) < 2 * RANGE else None
     sds = [pooled[1]] if pooled else [f.delay_sd for f in files if not f.shift]
     prepared = []
     for file, inspection in pairs:

@@ -20,7 +20,7 @@ from bowdenfit.recordings.preparation.blocks import (
     main_frequency,
     refuse_too_long,
 )
-from bowdenfit.recordings.preparation.checks import check_recording, check_sign
+from bowdenfit.recordings.preparation.checks import FEWEST_SAMPLES, check_recording, check_sign
 from bowdenfit.recordings.preparation.clock import (
     GOOD,
     KINDS,
@@ -31,14 +31,20 @@ from bowdenfit.recordings.preparation.clock import (
     spread_repeated,
     step_of,
 )
-from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
+from bowdenfit.recordings.preparation.delay import BEYOND, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_trend
+from bowdenfit.recordings.preparation.shift_scan import LateOutput, scan_shifts
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Vector
 
 _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _USUAL_BLOCK = 0.05
+_POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
+_LATE = (
+    "{0}: the output is {1:.3g} s {2} than the input, which was found from the forces and taken off; the usual causes are a "
+    "channel that a logger buffers, and channels that did not start together. State the delay if it is another."
+)
 NO_DELAY_OF_LOOPS = (
     "How much later the output channel is than the input channel is not estimated for a loop, whose forces pass through zero. "
     'No delay was assumed; state one if it is known: delay = { value = 10, unit = "ms" } under prepare in cable.toml.'
@@ -99,7 +105,7 @@ def inspect_recording(raw: RawRecording, settings: Preparation) -> Inspected:
     remarks = check_recording(raw)
     cleaned = _clean(raw, settings)
     together = _together(raw, cleaned, settings, 0.0)
-    return Inspected(raw, settings, remarks, cleaned, together, _delay(raw.loop, together, settings))
+    return Inspected(raw, settings, remarks, cleaned, together, _delay(raw, cleaned, together, settings))
 
 
 def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
@@ -110,7 +116,9 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
         shared_delay: Delay and its standard error [s] that replace those of this recording.
     """
     raw, settings, remarks, cleaned = inspected.raw, inspected.settings, inspected.remarks, inspected.cleaned
-    delay = inspected.delay if shared_delay is None else Delay(*shared_delay, inspected.delay.exponent)
+    delay = inspected.delay
+    if shared_delay is not None:
+        delay = Delay(*shared_delay, delay.exponent, delay.remark if delay.sd > 0 else "")
     common = _together(raw, cleaned, settings, delay.value) if delay.value else inspected.together
     _require_some_good(raw, common)
     good = common.fault == GOOD
@@ -198,14 +206,42 @@ def _velocity(raw: RawRecording, time: Vector) -> Vector:
     return pieces.interpolate(time, clock, raw.velocity, there, outside=np.nan)
 
 
-def _delay(loop: bool, common: CommonClock, settings: Preparation) -> Delay:
+def _delay(raw: RawRecording, cleaned: _Cleaned, common: CommonClock, settings: Preparation) -> Delay:
     if settings.delay == "none":
         return Delay(0.0, math.nan, math.nan)
     if isinstance(settings.delay, QuantityValue):
         return Delay(settings.delay.to("time"), math.nan, math.nan)
-    if loop:
+    if raw.loop:
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
-    return _estimate_delay(common, settings, slice(None))
+    estimate = _estimate_delay(common, settings, slice(None))
+    if late := _find_late_output(raw, common, is_beyond=estimate.reason == BEYOND):
+        rest = _estimate_delay(_together(raw, cleaned, settings, late.delay), settings, slice(None))
+        delay = late.delay + rest.value
+        remark = _LATE.format(raw.name, abs(delay), "later" if delay > 0 else "earlier")
+        return Delay(delay, rest.sd if rest.sd > 0 else late.sd, rest.exponent, remark)
+    return estimate
+
+
+def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool) -> LateOutput | None:
+    """Return by how much the output is late, if that is more than `estimate_delay` looks for.
+
+    Raises:
+        DatasetError: The motion repeats itself, so that another delay explains the output about as well.
+    """
+    good = common.fault == GOOD
+    if np.count_nonzero(good) < FEWEST_SAMPLES:
+        return None
+    time, forces = common.time, (common.input_force, common.output_force)
+    late = scan_shifts(time, forces[0], time, forces[1], _POINTS_OF_SCAN, good).late_output(is_beyond=is_beyond)
+    if late is not None and late.rival is not None:
+        raise DatasetError(
+            f"{raw.file}: in {raw.name!r} the output follows the input if it is {late.delay:.3g} s late, and about as well if "
+            f"it is {late.rival:.3g} s late (negative: early), because the motion repeats itself. The usual causes are "
+            "channels that a logger buffers, or that did not start together. State which it is, such as --set "
+            f"'tables.recordings.prepare.delay={{value={late.delay:.3g},unit=\"s\"}}' (in cable.toml delay under prepare), or "
+            "record a pause before the first stroke."
+        )
+    return late
 
 
 def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay]]:

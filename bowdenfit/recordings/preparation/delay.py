@@ -35,6 +35,7 @@ from bowdenfit.recordings.preparation.segments import (
 from bowdenfit.types import ChosenVector, Flags, Labels, Matrix, OtherVector, Vector
 
 RANGE = 0.25  # [s]; judged: filters and buses delay by less, and more would reach over whole strokes
+BEYOND = f"the best fit lies at the end of the range of {RANGE} s that was searched"
 COMMON_ERROR = 0.0015  # [s]; what is left over the 24 simulated benches (scripts/check_recordings.py simulates others)
 _FRICTIONS = np.linspace(0.3, 1.2, 10)  # of half the width of the loop, which delay and noise make wider: the start of a search
 _COARSE_ROWS = 3  # judged: stretches that the coarse search looks at
@@ -98,7 +99,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
     if not np.isfinite(sd) or sd > min(RANGE / 2, 2 * max(shortest, segments.step)):
         return _undetermined(f"its standard error would be {sd:.2g} s")
     if abs(point[2]) > RANGE - segments.step:
-        return _undetermined(f"the best fit lies at the end of the range of {RANGE} s that was searched")
+        return _undetermined(BEYOND)
     return Delay(float(point[2]), sd, float(point[0]))
 
 

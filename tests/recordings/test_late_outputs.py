@@ -1,0 +1,47 @@
+"""An output that is later than filters make it: found from the forces, or asked about where the motion repeats itself.
+
+The benches are those of `recorded_benches`, which shares no code with the package.
+"""
+
+import numpy as np
+import pytest
+from recorded_benches import RecordedBench, channels
+
+from bowdenfit.description import Preparation
+from bowdenfit.errors import DatasetError
+from bowdenfit.recordings.preparation import inspect_recording
+from bowdenfit.recordings.recording import RawRecording
+
+
+def inspected(seed=0, since=0, **bench):
+    columns = channels(RecordedBench(rate=50, length=60, **bench), np.random.default_rng(seed))
+    time, *forces = (columns[name][since:] for name in ("time_s", "input_force_N", "output_force_N"))
+    return inspect_recording(RawRecording("s", "s.csv", time, forces[0], time, forces[1]), Preparation())
+
+
+@pytest.mark.parametrize("wave", ["triangle", "sine", "chirp", "random"])
+@pytest.mark.parametrize("load", [1.0, 1e4])
+def test_an_output_that_is_late_by_a_quarter_of_the_period_is_found(wave, load):
+    delay = inspected(wave=wave, load=load, delay=1.5).delay
+    assert delay.value == pytest.approx(1.5, abs=0.05)
+    assert "the output is 1.5" in delay.remark and "s later than the input" in delay.remark
+
+
+def test_an_input_that_is_late_is_found():
+    delay = inspected(wave="chirp", delay=-0.8).delay
+    assert delay.value == pytest.approx(-0.8, abs=0.05)
+    assert "earlier" in delay.remark
+
+
+@pytest.mark.parametrize("wave", ["triangle", "sine", "chirp", "random"])
+def test_a_healthy_output_stays_as_it_is(wave):
+    delay = inspected(wave=wave, delay=0.02).delay
+    assert delay.value == pytest.approx(0.02, abs=0.05)
+    assert "later" not in delay.remark
+
+
+def test_half_a_period_of_equal_cycles_is_asked_about_with_the_option_that_states_it():
+    with pytest.raises(DatasetError) as refused:
+        inspected(wave="sine", delay=3.0, since=1000)
+    for part in ("about as well", "repeats itself", "--set 'tables.recordings.prepare.delay={value=", 'unit="s"}'):
+        assert part in str(refused.value)

@@ -34,9 +34,9 @@ from bowdenfit.recordings.preparation.clock import (
 from bowdenfit.recordings.preparation.delay import BEYOND, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_trend
-from bowdenfit.recordings.preparation.shift_scan import LateOutput, scan_shifts
+from bowdenfit.recordings.preparation.shift_scan import LateOutput, ShiftScan, scan_shifts
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
-from bowdenfit.types import Vector
+from bowdenfit.types import Flags, Vector
 
 _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _USUAL_BLOCK = 0.05
@@ -231,9 +231,14 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
     good = common.fault == GOOD
     if np.count_nonzero(good) < FEWEST_SAMPLES:
         return None
-    time, forces = common.time, (common.input_force, common.output_force)
-    late = scan_shifts(time, forces[0], time, forces[1], _POINTS_OF_SCAN, good).late_output(is_beyond=is_beyond)
-    if late is not None and late.rival is not None:
+    late = _scan(common, good, slice(None)).late_output(is_beyond=is_beyond)
+    if late is None:
+        return None
+    ends = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
+    lasting = slice(*np.searchsorted(common.time, ends).tolist())  # what has a partner with the delay and without
+    if _scan(common, good, lasting).late_output(is_beyond=is_beyond) is None:
+        return None  # something else than the delay differs between the parts of the recording
+    if late.rival is not None:
         raise DatasetError(
             f"{raw.file}: in {raw.name!r} the output follows the input if it is {late.delay:.3g} s late, and about as well if "
             f"it is {late.rival:.3g} s late (negative: early), because the motion repeats itself. The usual causes are "
@@ -242,6 +247,12 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
             "record a pause before the first stroke."
         )
     return late
+
+
+def _scan(common: CommonClock, good: Flags, part: slice) -> ShiftScan:
+    """Compare the input with a part of the output, at every shift."""
+    time, force = common.time, common.output_force
+    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, (good, good[part]))
 
 
 def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay]]:

@@ -14,7 +14,7 @@ from bowdenfit.files.pieces import split_pieces, subsample
 from bowdenfit.recordings.preparation.blocks import main_frequency
 from bowdenfit.recordings.preparation.delay import RANGE
 from bowdenfit.recordings.preparation.segments import play_along_rows
-from bowdenfit.types import Flags, OtherVector, Vector
+from bowdenfit.types import ChosenFlags, Flags, OtherVector, Vector
 
 _STEP = 0.005  # [s] between points, at least
 _EXPONENTS = np.linspace(0.0, 0.45, 12)  # over the range of log input force; at half of it the output stands still
@@ -30,6 +30,7 @@ OVERLAP = 0.5  # judged: share of the shorter recording that must lie within the
 AS_WELL = 3.0
 _FOLLOWED = 0.2  # judged: share of the output's variance that a late output may leave unexplained
 _MUCH_BETTER = 3.0  # see AS_WELL
+_BETTER = 1.5  # judged: the same, of an output whose delay lies at the end of the range or beyond it
 _NEGLIGIBLE = 0.005  # judged: share of the output's variance that a late output leaves unexplained at least, when read as usual
 _UNSURE = 0.04  # judged: of a quarter of the period; what a late output is not known to at best
 _MUCH_LATER = 1.5  # judged: ratio of two delays from which the smaller is the likelier
@@ -98,7 +99,7 @@ class ShiftScan:
         """
         least = self.best[1]
         usual = np.min(self.unexplained, where=np.abs(self.shift) <= RANGE, initial=1.0)
-        if least > _FOLLOWED or not (is_beyond or usual > max(_MUCH_BETTER * least, _NEGLIGIBLE)):
+        if least > _FOLLOWED or usual < max((_BETTER if is_beyond else _MUCH_BETTER) * least, _NEGLIGIBLE):
             return None
         as_well = np.flatnonzero(self.unexplained <= np.sqrt(least * usual))
         valleys = np.split(as_well, np.flatnonzero(np.diff(as_well) > 1) + 1)
@@ -115,21 +116,21 @@ def scan_shifts(
     output_time: OtherVector,
     output_force: OtherVector,
     most_points: int,
-    good: Flags | None = None,
+    good: tuple[Flags, ChosenFlags] | None = None,
 ) -> ShiftScan:
     """Compare the output with what the play operator makes of the input, at every shift.
 
     Args:
         input_time, input_force: Samples of the input [s, N].
         output_time, output_force: Samples of the output [s, N].
-        good: Samples that may be used, of two channels on one clock; None for all that are finite.
+        good: Samples of both that may be used; None for all that are finite.
         most_points: Points of a coarse clock that the longer recording is averaged onto, at most.
     """
     longest = max(float(np.ptp(input_time)), float(np.ptp(output_time)))
     usual = [float(np.median(np.diff(subsample(time)))) for time in (input_time, output_time)]
     step = max(_STEP, longest / most_points, *usual)
-    x, is_x = _average(input_time, input_force, good, step)
-    y, is_y = _average(output_time, output_force, good, step)
+    x, is_x = _average(input_time, input_force, good[0] if good else None, step)
+    y, is_y = _average(output_time, output_force, good[1] if good else None, step)
     log_input = np.log(np.maximum(x, _LEAST_FORCE * np.max(x)))
     explained = np.zeros(len(x) + len(y) - 1)
     reference = _Reference.of(is_x, y, is_y)
@@ -151,7 +152,7 @@ def scan_shifts(
     return ShiftScan(input_time[0] - output_time[0] - lags * step, unexplained, near)
 
 
-def _average(time: OtherVector, force: OtherVector, good: Flags | None, step: float) -> tuple[Vector, Vector]:
+def _average(time: OtherVector, force: OtherVector, good: ChosenFlags | None, step: float) -> tuple[Vector, Vector]:
     """Return means of the force on a coarse clock from its first sample, without wild readings, and which points have any."""
     some = subsample(force)
     ends = np.quantile(some[np.isfinite(some)], (_WILD, 1 - _WILD))

@@ -34,13 +34,14 @@ from bowdenfit.recordings.preparation.clock import (
 from bowdenfit.recordings.preparation.delay import BEYOND, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_trend
-from bowdenfit.recordings.preparation.shift_scan import LateOutput, ShiftScan, scan_shifts
+from bowdenfit.recordings.preparation.shift_scan import OVERLAP, LateOutput, ShiftScan, scan_shifts
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Flags, Vector
 
 _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _USUAL_BLOCK = 0.05
 _POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
+_ALL = 0.99  # share of a part of the output that lies within the input at every shift
 _LATE = (
     "{0}: the output is {1:.3g} s {2} than the input, which was found from the forces and taken off; the usual causes are a "
     "channel that a logger buffers, and channels that did not start together. State the delay if it is another."
@@ -231,12 +232,12 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
     good = common.fault == GOOD
     if np.count_nonzero(good) < FEWEST_SAMPLES:
         return None
-    late = _scan(common, good, slice(None)).late_output(is_beyond=is_beyond)
+    late = _scan(common, good, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
     if late is None:
         return None
     ends = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
     lasting = slice(*np.searchsorted(common.time, ends).tolist())  # what has a partner with the delay and without
-    if _scan(common, good, lasting).late_output(is_beyond=is_beyond) is None:
+    if _scan(common, good, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
         return None  # something else than the delay differs between the parts of the recording
     if late.rival is not None:
         raise DatasetError(
@@ -249,10 +250,10 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
     return late
 
 
-def _scan(common: CommonClock, good: Flags, part: slice) -> ShiftScan:
+def _scan(common: CommonClock, good: Flags, part: slice, overlap: float) -> ShiftScan:
     """Compare the input with a part of the output, at every shift."""
     time, force = common.time, common.output_force
-    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, (good, good[part]))
+    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, (good, good[part]), overlap)
 
 
 def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay]]:

@@ -117,6 +117,7 @@ def scan_shifts(
     output_force: OtherVector,
     most_points: int,
     good: tuple[Flags, ChosenFlags] | None = None,
+    overlap: float = OVERLAP,
 ) -> ShiftScan:
     """Compare the output with what the play operator makes of the input, at every shift.
 
@@ -124,6 +125,7 @@ def scan_shifts(
         input_time, input_force: Samples of the input [s, N].
         output_time, output_force: Samples of the output [s, N].
         good: Samples of both that may be used; None for all that are finite.
+        overlap: Share of the shorter one that must lie within the other.
         most_points: Points of a coarse clock that the longer recording is averaged onto, at most.
     """
     longest = max(float(np.ptp(input_time)), float(np.ptp(output_time)))
@@ -146,7 +148,7 @@ def scan_shifts(
         exponents = np.maximum(best[1] + apart * _FINER, 0.0)
     lags = np.arange(len(explained)) - (len(x) - 1)
     common = np.minimum(len(x), len(y) - lags) - np.maximum(0, -lags)
-    unexplained = np.where(common >= OVERLAP * min(len(x), len(y)), 1 - explained, 1.0)
+    unexplained = np.where(common >= overlap * min(len(x), len(y)), 1 - explained, 1.0)
     main = main_frequency(x, x, 1 / step)
     near = max(RANGE, 0.25 / main) if main > 0 else RANGE
     return ShiftScan(input_time[0] - output_time[0] - lags * step, unexplained, near)

@@ -5,6 +5,7 @@ A recording without a reversal has no loop; other signs say where its rope slide
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -35,6 +36,7 @@ _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which 
 _LARGEST_GAIN_ERROR = 0.1  # log ratio that a bad calibration of load cells may add: ten times what their data sheets state
 _WINDOW, _SHARE = 5, 20  # least blocks on both sides over which a force must rise, and one part in so many of the recording
 _SURELY_RISES = 4.0  # standard errors by which it must
+_STICKS = 0.2  # judged: share of the friction exponent by which the input must fall between two pulls
 _STILL = 0.05  # fraction of the highest speed below which the motor is taken to stand
 OPPOSED = -0.5  # judged: correlation below which the forces go against each other
 _FOLLOWS = 0.5  # correlation, and share of the output's variance that friction explains, below both of which it does not
@@ -143,7 +145,7 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
         velocity: Velocity of the blocks; NaN where it is not known.
     """
     ratio = np.log(loop.force_in / loop.force_out)
-    if RETURN in loop.state or np.median(ratio) <= 0:
+    if RETURN in loop.state or np.median(ratio) <= 0 or _sticks_between_pulls(loop):
         return loop.state
     finite = np.isfinite(velocity)
     highest = np.max(np.abs(velocity[finite]), initial=0.0)
@@ -153,6 +155,19 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
     moves = finite & (np.abs(velocity) > _STILL * highest) if highest > 0 else np.zeros(len(finite), dtype=bool)
     rises = _rises(loop.force_in) & _rises(loop.force_out)
     return np.where(moves | (rises & ~finite), PULL, loop.state)
+
+
+def _sticks_between_pulls(loop: Hysteresis) -> bool:
+    """Return whether the rope sticks while the input falls between two pulls, by less than the return takes.
+
+    Then the input reverses, and the operator knows where the rope slides: both forces may rise before its band is crossed.
+    """
+    pulls = np.flatnonzero(loop.state == PULL)
+    if loop.cost >= _COST_OF_NOISE or len(pulls) < 2:
+        return False
+    likely = np.log(smooth_input(loop.force_in))
+    drops = [likely[a] - likely[a : b + 1].min() for a, b in pairwise(pulls.tolist()) if b > a + 1]
+    return max(drops, default=0.0) > _STICKS * loop.exponent
 
 
 def _rises(force: Vector) -> Flags:

@@ -180,6 +180,10 @@ class Kind(ABC, Generic[AnyTable]):
         """Describe wrap angles that must be wrong, because equal ones lose too differently; empty if there are none."""
         return ""
 
+    def bench_faults(self, table: AnyTable, description: Description) -> list[str]:
+        """Return faults of the bench that the readings show by themselves, each with its usual cause and what to do."""
+        return []
+
     def coarse_readings(self, table: AnyTable) -> CoarseReadings | None:
         """Return what is known of a table whose repeated readings are equal to the last digit; None for any other."""
         return None

@@ -33,6 +33,12 @@ class RecordedBench:
         mountings: How many, with a recording each.
         scatter: Standard deviation of their exponents.
         velocity: Whether the speed is recorded.
+        preload: Force of the spring at rest.
+        stiffness: Of the rope, over that of the spring.
+        least: Lowest position of the motor after the first half period, over the highest: how near loops are to the play's width.
+        crosstalk: Share of either force that the other cell reads.
+        input_jump, output_jump: Of the zero of a cell at half time.
+        other_friction: Friction exponent from half time on, over that before.
     """
 
     rate: float = 500.0
@@ -52,6 +58,11 @@ class RecordedBench:
     velocity: bool = False
     preload: float = 0.2
     stiffness: float = 20.0
+    least: float = 0.0
+    crosstalk: float = 0.0
+    input_jump: float = 0.0
+    output_jump: float = 0.0
+    other_friction: float = 1.0
 
     @property
     def unusual(self) -> str:
@@ -70,10 +81,16 @@ def channels(bench: RecordedBench, generator: np.random.Generator) -> dict[str, 
     fine = np.arange(samples * finer) / (bench.rate * finer)
     exponent = bench.exponent + bench.scatter * generator.standard_normal()
     output = (1 - bench.preload) / np.exp(exponent)
-    motor = _position(bench, fine, generator) * (output + (1 - bench.preload) / bench.stiffness)
+    motor = _position(bench, fine, generator)
+    if bench.least:
+        motor = np.where(fine < bench.period / 2, motor, np.maximum(motor, 0) * (1 - bench.least) + bench.least)
+    motor = motor * (output + (1 - bench.preload) / bench.stiffness)
     forces = [_filtered(force, bench.cutoff / (bench.rate * finer)) for force in _forces(bench, motor, exponent)]
     time = fine[::finer]
     pulled, output = forces[0][::finer], np.interp(time - bench.delay, fine, forces[1])
+    pulled, output = pulled + bench.crosstalk * output, output + bench.crosstalk * pulled
+    late = np.arange(samples) >= samples // 2
+    pulled, output = pulled + bench.input_jump * late, output + bench.output_jump * late
     white = generator.standard_normal((2, samples))
     if bench.correlated:
         decay = np.exp(-1 / (bench.correlated * bench.rate))
@@ -107,8 +124,10 @@ def _position(bench: RecordedBench, time: np.ndarray, generator: np.random.Gener
 def _forces(bench: RecordedBench, motor: np.ndarray, exponent: float) -> tuple[np.ndarray, np.ndarray]:
     """Input and output force for a motion of the motor; the spring is of unit stiffness, and at rest at the start."""
     stiff, preload = bench.stiffness, bench.preload
+    late = np.arange(len(motor)) >= len(motor) // 2
+    exponents = exponent * np.where(late, bench.other_friction, 1.0)
     ends = []
-    for ratio in (np.exp(exponent), np.exp(-exponent)):
+    for ratio in (np.exp(exponents), np.exp(-exponents)):
         ends.append(np.maximum((stiff * motor + (preload + bench.drag) * (1 - ratio)) / (stiff + ratio), 0.0).tolist())
     value, places = 0.0, []
     for least, most in zip(*ends, strict=True):

@@ -17,6 +17,7 @@ from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordi
 from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import AngleTable, Measurements
+from bowdenfit.recordings.bench_faults import BenchFault, describe_bench_fault, find_bench_fault
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Recording, Recordings
 from bowdenfit.types import Vector
 from bowdenfit.units import speed_dimension
@@ -279,6 +280,21 @@ class RecordingKind(FrictionKind[Recordings]):
                     f"the recording {recording.name} holds the same forces as the recording {name}, to the last digit"
                 )
         return copied
+
+    @override
+    def bench_faults(self, table: Recordings, description: Description) -> list[str]:
+        """Return a sentence on each kind of fault, of the recording that shows it most clearly."""
+        if table.loop:
+            return []
+        options = {option.strip() for option in description.friction_model.split("+")}
+        expects_drag = description.fits_offsets or bool(options & {"drag", "load-dependent"})
+        expects_creep = bool(options & {"dahl", "lugre"})
+        clearest: dict[str, tuple[BenchFault, str]] = {}
+        for recording in table.items:
+            fault = find_bench_fault(recording, expects_drag=expects_drag, expects_creep=expects_creep)
+            if fault and (fault.kind not in clearest or fault.significance > clearest[fault.kind][0].significance):
+                clearest[fault.kind] = fault, recording.file
+        return [describe_bench_fault(*clear) for clear in clearest.values()]
 
     @override
     def with_bench_error(self, table: Recordings, error: BenchError) -> Recordings:

@@ -146,8 +146,13 @@ def collect_warnings(dataset: Dataset) -> list[str]:
 
 
 def describe_unusable_readings(dataset: Dataset) -> tuple[str, ...]:
-    """Describe copied and cut-off readings and wrong wrap angles, with remedies; a fit of such readings is not trusted."""
-    return describe_copied_readings(dataset) + describe_cut_off_readings(dataset) + describe_wrong_angles(dataset)
+    """Describe copied or cut-off readings, wrong wrap angles and faults of the bench; fits of such readings are not trusted."""
+    return (
+        describe_copied_readings(dataset)
+        + describe_cut_off_readings(dataset)
+        + describe_wrong_angles(dataset)
+        + describe_bench_faults(dataset)
+    )
 
 
 def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
@@ -159,6 +164,12 @@ def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
         "intervals are too narrow: leave them out, or put in what was measured."
         for sentence in copies
     )
+
+
+def describe_bench_faults(dataset: Dataset) -> tuple[str, ...]:
+    """Describe faults of the bench that the readings of a table show by themselves; see `Kind.bench_faults`."""
+    tables = iterate_tables(dataset.measurements)
+    return tuple(sentence for kind, table in tables for sentence in kind.bench_faults(table, dataset.description))
 
 
 def describe_wrong_angles(dataset: Dataset) -> tuple[str, ...]:

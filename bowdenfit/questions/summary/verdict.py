@@ -11,6 +11,7 @@ from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.data_set_words import (
+    describe_bench_faults,
     describe_copied_readings,
     describe_cut_off_readings,
     describe_wrong_angles,
@@ -155,7 +156,8 @@ def assess_fit(fit: Record) -> Verdict:
         COPIED: copies,
         CUT_OFF: describe_cut_off_readings(fit.dataset),
         COARSE: describe_coarse_readings(fit),
-        NOT_DESCRIBED: () if copies else describe_lack_of_fit(fit),  # copies make the least departure certain
+        # Copies make the least departure certain.
+        NOT_DESCRIBED: () if copies else describe_bench_faults(fit.dataset) + describe_lack_of_fit(fit),
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
     to_leave = describe_coefficients_to_leave(fit) if usable.holds else ""

@@ -1,0 +1,104 @@
+"""Faults of a bench that its channels reveal: each is named with its size and time, and its healthy twin raises no alarm.
+
+The benches are those of `recorded_benches`, which shares no code with the package.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded_benches import RecordedBench, channels, draw_bench, write
+
+import bowdenfit as bf
+from bowdenfit.description import Preparation
+from bowdenfit.recordings.bench_faults import describe_bench_fault, find_bench_fault
+from bowdenfit.recordings.preparation import prepare
+from bowdenfit.recordings.recording import RawRecording, Recording
+from bowdenfit.recordings.strokes import find_strokes
+
+NONE = np.zeros(0)
+BENCHES = [
+    {"wave": "sine", "load": 1.0, "rate": 50},
+    {"wave": "triangle", "load": 1e4, "rate": 100, "period": 10.0},
+    {"wave": "random", "load": 100.0, "rate": 20, "period": 8.0},
+]
+
+
+def recording(bench, seed=0):
+    columns = channels(bench, np.random.default_rng(seed))
+    time, *forces = (columns[name] for name in ("time_s", "input_force_N", "output_force_N"))
+    blocks, account = prepare(RawRecording("s", "s.csv", time, forces[0], time, forces[1]), Preparation())
+    return Recording("s", "s.csv", "s", np.nan, NONE, NONE, blocks, find_strokes(blocks, "s.csv", "s"), account)
+
+
+@pytest.mark.parametrize("usual", BENCHES)
+@pytest.mark.parametrize("end", ["input", "output"])
+def test_a_zero_that_jumps_is_named_with_its_size_and_time(usual, end):
+    bench = RecordedBench(length=60, **usual, **{f"{end}_jump": 0.1})
+    fault = find_bench_fault(recording(bench))
+    assert fault.kind == f"{end}_zero"
+    assert fault.size == pytest.approx(0.1 * bench.load, rel=0.1)
+    assert fault.time == pytest.approx(30, abs=3)
+    assert fault.exponent == pytest.approx(bench.exponent, rel=0.05)
+    assert f"the zero of {end}_force jumps by" in describe_bench_fault(fault, "s.csv")
+
+
+@pytest.mark.parametrize("usual", BENCHES)
+def test_friction_that_changes_half_way_is_named_with_both_exponents(usual):
+    fault = find_bench_fault(recording(RecordedBench(length=60, other_friction=0.5, **usual)))
+    assert fault.kind == "friction"
+    assert 1 + fault.size == pytest.approx(0.5, abs=0.05)
+    assert fault.time == pytest.approx(30, abs=3)
+    assert "friction changes at about" in describe_bench_fault(fault, "s.csv")
+
+
+@pytest.mark.parametrize("usual", [BENCHES[0], {"wave": "chirp", "load": 1e4, "rate": 41}])
+def test_crosstalk_is_named_by_what_the_output_moves_after_each_reversal(usual):
+    fault = find_bench_fault(recording(RecordedBench(length=60, crosstalk=0.05, noise=0.001, **usual)))
+    assert fault.kind == "crosstalk"
+    assert fault.size == pytest.approx(0.05, abs=0.025)
+    assert "right after each reversal" in describe_bench_fault(fault, "s.csv")
+
+
+@pytest.mark.parametrize("usual", BENCHES)
+def test_a_drag_is_named_unless_the_fit_has_one(usual):
+    bench = RecordedBench(length=60, drag=0.15, **usual)
+    fault = find_bench_fault(recording(bench))
+    assert fault.kind == "drag"
+    assert fault.size == pytest.approx(0.15 * bench.load, rel=0.3)
+    assert fault.exponent == pytest.approx(bench.exponent, rel=0.05)
+    assert find_bench_fault(recording(bench), expects_drag=True) is None
+
+
+@pytest.mark.parametrize("usual", BENCHES)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_healthy_bench_has_no_fault(usual, seed):
+    assert find_bench_fault(recording(RecordedBench(length=60, **usual), seed)) is None
+
+
+def test_a_zero_that_drifts_is_no_jump():
+    assert find_bench_fault(recording(RecordedBench(length=60, drift=0.1, rate=50))) is None
+
+
+@pytest.mark.extended
+def test_check_warns_of_it_and_the_verdict_ends_with_the_same_sentence(tmp_path):
+    bench = RecordedBench(length=60, rate=50, output_jump=0.1)
+    healthy = bf.check(write(replace(bench, output_jump=0.0), tmp_path / "healthy", 0))
+    assert not healthy.warnings
+    folder = write(bench, tmp_path / "bench", 0)
+    (warning,) = bf.check(folder).warnings
+    assert "r0.csv: the zero of output_force jumps by" in warning
+    fit = bf.fit(folder, mcmc=False, seed=1)
+    assert not fit.verdict().trusted
+    assert warning in fit.verdict().reasons
+
+
+@pytest.mark.slow
+def test_none_of_200_healthy_benches_unlike_each_other_has_a_fault():
+    alarms = []
+    for seed in range(200):
+        bench = draw_bench(seed)
+        bench = replace(bench, rate=min(bench.rate, 200.0))
+        fault = find_bench_fault(recording(bench, seed), expects_drag=bench.drag > 0)
+        alarms += [(seed, fault)] if fault else []
+    assert len(alarms) <= 1, alarms

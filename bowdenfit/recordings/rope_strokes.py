@@ -40,6 +40,7 @@ _STICKS = 0.2  # judged: share of the friction exponent by which the input must 
 _STILL = 0.05  # fraction of the highest speed below which the motor is taken to stand
 OPPOSED = -0.5  # judged: correlation below which the forces go against each other
 _FOLLOWS = 0.5  # correlation, and share of the output's variance that friction explains, below both of which it does not
+_STEADY_WEIGHT = 0.03  # judged: relative scatter of the output up to which it is a constant load
 _CHANGES = 3.0  # spread of the input, in units of its noise, from which the output could follow it
 
 
@@ -296,6 +297,13 @@ def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
     return tuple(remarks)
 
 
+def _hangs_still(force_in: Vector, force_out: Vector) -> bool:
+    """Return whether the output stays at a force between the highest and the lowest input, as a dead weight makes it."""
+    weight = float(np.mean(force_out))
+    low, high = np.quantile(force_in, (0.05, 0.95))
+    return bool(low < weight < high and np.std(force_out) < _STEADY_WEIGHT * weight)
+
+
 def refuse_dead(force_in: Vector, force_out: Vector, file: str, name: str, loop: Hysteresis | None = None) -> None:
     """Refuse a recording whose output does not follow its input.
 
@@ -313,6 +321,15 @@ def refuse_dead(force_in: Vector, force_out: Vector, file: str, name: str, loop:
     alike = float(np.corrcoef(force_in, force_out)[0, 1]) if np.ptp(force_out) > 0 else 0.0
     spread = float(np.var(np.log(loop.force_out + loop.lost))) if loop is not None else 0.0
     explained = 1 - float(np.var(loop.deviation)) / spread if loop is not None and spread > 0 else 0.0
+    if max(abs(alike), explained) < _FOLLOWS and _hangs_still(force_in, force_out):
+        exponent = float(np.log(np.quantile(force_in, 0.95) / np.quantile(force_in, 0.05))) / 2
+        raise DatasetError(
+            f"{file}: the output of {name!r} stays at {np.mean(force_out):.4g} N while the input goes from "
+            f"{force_in.min():.4g} to {force_in.max():.4g} N, on both sides of it. The usual cause is a dead weight at the "
+            f"output (a friction exponent of about {exponent:.2g}), whose force does not show when the motor pulls and when "
+            "it returns. State both in cable.toml, under its [[recording]]: strokes = "
+            '[{ start = ..., end = ..., stroke = "pull" }].'
+        )
     if alike < OPPOSED and explained < _FOLLOWS:
         raise DatasetError(
             f"{file}: the output falls where the input rises in {name!r}: correlation {alike:.2f}. The usual causes are the "

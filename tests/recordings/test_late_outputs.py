@@ -13,9 +13,9 @@ from bowdenfit.recordings.preparation import inspect_recording
 from bowdenfit.recordings.recording import RawRecording
 
 
-def inspected(seed=0, since=0, **bench):
+def inspected(seed=0, first=0, **bench):
     columns = channels(RecordedBench(rate=50, length=60, **bench), np.random.default_rng(seed))
-    time, *forces = (columns[name][since:] for name in ("time_s", "input_force_N", "output_force_N"))
+    time, *forces = (columns[name][first:] for name in ("time_s", "input_force_N", "output_force_N"))
     return inspect_recording(RawRecording("s", "s.csv", time, forces[0], time, forces[1]), Preparation())
 
 
@@ -42,6 +42,6 @@ def test_a_healthy_output_stays_as_it_is(wave):
 
 def test_half_a_period_of_equal_cycles_is_asked_about_with_the_option_that_states_it():
     with pytest.raises(DatasetError) as refused:
-        inspected(wave="sine", delay=3.0, since=1000)
+        inspected(wave="sine", delay=3.0, first=1000)
     for part in ("about as well", "repeats itself", "--set 'tables.recordings.prepare.delay={value=", 'unit="s"}'):
         assert part in str(refused.value)

@@ -35,7 +35,7 @@ class RecordedBench:
         velocity: Whether the speed is recorded.
         preload: Force of the spring at rest.
         stiffness: Of the rope, over that of the spring.
-        least: Lowest position of the motor after the first half period, over the highest: how near loops are to the play's width.
+        least: Lowest position of the motor after the first half period, over the highest.
         crosstalk: Share of either force that the other cell reads.
         input_jump, output_jump: Of the zero of a cell at half time.
         other_friction: Friction exponent from half time on, over that before.

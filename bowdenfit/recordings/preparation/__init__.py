@@ -216,10 +216,10 @@ def _delay(raw: RawRecording, cleaned: _Cleaned, common: CommonClock, settings: 
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
     estimate = _estimate_delay(common, settings, slice(None))
     if late := _find_late_output(raw, common, is_beyond=estimate.reason == BEYOND):
-        rest = _estimate_delay(_together(raw, cleaned, settings, late.delay), settings, slice(None))
-        delay = late.delay + rest.value
+        remainder = _estimate_delay(_together(raw, cleaned, settings, late.delay), settings, slice(None))
+        delay = late.delay + remainder.value
         remark = _LATE.format(raw.name, abs(delay), "later" if delay > 0 else "earlier")
-        return Delay(delay, rest.sd if rest.sd > 0 else late.sd, rest.exponent, remark)
+        return Delay(delay, remainder.sd if remainder.sd > 0 else late.sd, remainder.exponent, remark)
     return estimate
 
 

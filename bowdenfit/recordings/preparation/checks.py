@@ -12,6 +12,11 @@ FEWEST_SAMPLES = 20  # judged: fewer are a table
 LARGEST_FORCE = 1e6  # N, far beyond any Bowden cable
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 86_400.0  # s, of any converter, and of what is still a recording
 _HALF_DAY = 43_200.0  # s; the fall of a 12-hour clock from 12:59:59 to 1:00:00, but for one step
+_OVERFLOWS = {  # s; what counters of microcontrollers fall by
+    2**32 * 1e-6: "a counter of microseconds with 32 bits, as of micros(), that overflows",
+    2**32 * 1e-3: "a counter of milliseconds with 32 bits, as of millis(), that overflows",
+    2**16 * 1e-3: "a counter of milliseconds with 16 bits that overflows",
+}
 _MOST_REPEATED = 0.5  # judged: share of times that stand there twice, from which the clock is not one of samples
 
 
@@ -156,6 +161,10 @@ def explain_backward_clock(name: str, time: Vector) -> str:
     some = np.diff(subsample(time))
     if -_HALF_DAY <= time[at + 1] - time[at] < -_HALF_DAY + max(60.0, 10 * float(np.nanmedian(np.abs(some)))):
         return f"{place} a 12-hour clock written without AM and PM. Export the time with 24 hours, or in seconds."
+    usual = float(np.nanmedian(np.abs(some)))
+    for overflow, counter in _OVERFLOWS.items():
+        if abs(time[at + 1] - time[at] + overflow) < 10 * usual:
+            return f"{place} {counter}, which begins again at 0. Add {overflow:.10g} s to all times from there on."
     if np.mean(some < 0) > _MOST_REPEATED:
         return f"{place} a file whose last sample comes first. Sort its rows by the time."
     return f"{place} two recordings in one file. Split the file there."

@@ -14,6 +14,7 @@ from bowdenfit.types import ChosenFlags, ChosenVector, Flags, Labels, OtherVecto
 
 _SPIKE_SDS = 8.0  # judged: one normal sample in 10^15 is so far off
 _HALF_WINDOW = 5  # judged: samples on each side of the running median
+_LOADED = 0.2  # judged: of the typical force, above which a force does not fall to 0 and back from sample to sample
 _LONGEST_SPIKE = 3  # samples; judged: what is longer may be motion
 _SHORTEST_RUN = 10  # judged: equal samples from which a run may be a frozen channel
 _PROBABILITY = 1e-6  # that quantised noise makes such a run in a recording; judged
@@ -79,6 +80,8 @@ def flag_samples(
     Returns:
         The channel with its faults, and the ends of the range that were taken [N].
     """
+    if settings.dropouts:
+        force = _without(force, _skipped(force))
     finite = np.isfinite(force)
     other = _beside(time, other_time, other_force)
     some = subsample(other_force)
@@ -97,6 +100,21 @@ def flag_samples(
     fault[~finite] = DROPOUT
     gap = gaps_of(time) if settings.dropouts else np.zeros(len(time), dtype=bool)
     return Sampled(time, _without(force, ~finite), fault, gap), ends
+
+
+def _skipped(force: Vector) -> Flags:
+    """Return up to three successive samples that are exactly 0 between samples far above it, as a multiplexer writes them."""
+    zero = force == 0
+    if not zero.any():
+        return zero
+    some = subsample(force)
+    loaded = force > _LOADED * float(np.nanmedian(some[some > 0])) if np.any(some > 0) else zero
+    edges = np.diff(zero.astype(np.int8), prepend=0, append=0)
+    start, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    inside = (start > 0) & (end < len(force)) & (end - start <= _LONGEST_SPIKE)
+    start, end = start[inside], end[inside]
+    sudden = loaded[start - 1] & loaded[end]
+    return _from_to(start[sudden], end[sudden], len(force))
 
 
 def _beside(time: Vector, other_time: OtherVector, other_force: OtherVector) -> Vector:

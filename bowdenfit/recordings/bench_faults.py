@@ -33,7 +33,7 @@ from bowdenfit.types import OtherLabels, Vector
 
 FaultKind = Literal["input_zero", "output_zero", "friction", "crosstalk", "drag", "none"]
 
-# Judged where nothing else is said; scripts/check_bench_faults.py counts false alarms and what is found.
+# Judged where nothing else is said; tests/recordings/test_bench_faults.py counts false alarms.
 _MOST_BLOCKS, _STRETCH = 800, 50  # more say no more about a fault; blocks of each of the stretches that are taken of more
 _OF_CYCLE = 24  # blocks that thinning leaves of a cycle
 _FEWEST_BLOCKS = 60  # of a recording in which a fault can be told from noise

@@ -39,6 +39,7 @@ from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawR
 from bowdenfit.types import Flags, Vector
 
 _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
+_MIRRORED = -0.9  # judged: correlation below which the output falls by all that the input rises
 _USUAL_BLOCK = 0.05
 _POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
 _ALL = 0.99  # share of a part of the output that lies within the input at every shift
@@ -230,7 +231,7 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
         DatasetError: The motion repeats itself, so that another delay explains the output about as well.
     """
     good = common.fault == GOOD
-    if np.count_nonzero(good) < FEWEST_SAMPLES:
+    if np.count_nonzero(good) < FEWEST_SAMPLES or _is_opposed(common, good):
         return None
     late = _scan(common, good, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
     if late is None:
@@ -248,6 +249,12 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
             "record a pause before the first stroke."
         )
     return late
+
+
+def _is_opposed(common: CommonClock, good: Flags) -> bool:
+    """Return whether the output falls by all that the input rises, as in a pull-pull pair; that is refused later."""
+    forces = common.input_force[good], common.output_force[good]
+    return all(np.ptp(force) > 0 for force in forces) and float(np.corrcoef(*forces)[0, 1]) < _MIRRORED
 
 
 def _scan(common: CommonClock, good: Flags, part: slice, overlap: float) -> ShiftScan:

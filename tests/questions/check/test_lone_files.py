@@ -349,5 +349,5 @@ def test_readings_at_several_lengths_are_proposed_to_init_with_the_table_of_angl
     for path in (forces, angles):
         assert f"bowdenfit init my-cable --from {angles} {forces}" in run("check", path)[1]
     columns = (lengths, 0 * lengths + 90, load, 0.7 * load)
-    own = write(tmp_path, ("Länge [mm]", "wrap_angle_deg", "Fin (N)", "Fout (N)"), columns)
-    assert "bowdenfit init" not in run("check", own)[1]
+    with_angles = write(tmp_path, ("Länge [mm]", "wrap_angle_deg", "Fin (N)", "Fout (N)"), columns)
+    assert "bowdenfit init" not in run("check", with_angles)[1]

@@ -334,8 +334,8 @@ def refuse_dead(force_in: Vector, force_out: Vector, file: str, name: str, loop:
         raise DatasetError(
             f"{file}: the output falls where the input rises in {name!r}: correlation {alike:.2f}. The usual causes are the "
             "two tensions of a pull-pull pair, of which one falls while the other rises, a load cell with inverted sign, and "
-            "an output that is late by half a period: map the channels at both ends of one rope, state the delay under prepare, "
-            "or leave the recording out."
+            "an output that is late by half a period: map the channels at both ends of one rope, state the delay under "
+            "prepare, or leave the recording out."
         )
     if alike < _FOLLOWS and explained < _FOLLOWS:
         raise DatasetError(

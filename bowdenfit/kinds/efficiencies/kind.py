@@ -46,6 +46,7 @@ from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent
 
 LOSS = Quantity("loss", "ratio")
+_HUNDREDTH = 0.005  # judged: share of the lowest other efficiency from which a small one is a hundredth of what it should be
 _FRACTION = 0.01  # efficiency up to which a percentage is as likely a fraction; a judgement
 _SDS = 4.5  # stated standard deviations above 1: one healthy row of 300,000 exceeds it
 
@@ -130,6 +131,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         )
         if "run" in columns:
             _refuse_shared_runs(columns["run"].cells, rows)
+        _refuse_single_fractions(column, rows)
         remarks = (*_remark_fractions(column, rows), *remark_on_errors_in_cells(table, columns))
         return TableFromFiles(rows, {path.name: path}, remarks, (table.account,))
 
@@ -199,6 +201,25 @@ def _remark_fractions(column: Column, table: EfficiencyTable) -> tuple[str, ...]
         f"{table.origin.describe_row(first)}: {which} at most 1 %; the usual cause is a fraction under a heading that says "
         "percent: call the column efficiency, or write percentages.",
     )
+
+
+def _refuse_single_fractions(column: Column, table: EfficiencyTable) -> None:
+    """Refuse a fraction among percentages: 0.775 where the others are 67.8 to 78.5.
+
+    Raises:
+        DatasetError: There is one.
+    """
+    is_small = table.efficiency <= _FRACTION
+    if not np.any(~is_small):
+        return
+    low, high = (float(end(table.efficiency[~is_small])) for end in (np.min, np.max))
+    for cell, efficiency in zip(column.cells, table.efficiency, strict=True):
+        if _is_in_percent(cell, column) and _HUNDREDTH * low <= efficiency <= _FRACTION:
+            raise cell.refuse(
+                f"{cell.shown} is {100 * efficiency:.3g} %, and the other efficiencies are {100 * low:.3g} to "
+                f"{100 * high:.3g} %. The usual cause is a fraction among percentages: write {1e4 * efficiency:.3g}, or leave "
+                "the row out."
+            )
 
 
 def _check_pulling(cell: Cell) -> int:

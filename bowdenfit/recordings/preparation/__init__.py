@@ -31,7 +31,7 @@ from bowdenfit.recordings.preparation.clock import (
     spread_repeated,
     step_of,
 )
-from bowdenfit.recordings.preparation.delay import BEYOND, Delay, estimate_delay
+from bowdenfit.recordings.preparation.delay import BEYOND, RANGE, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_trend
 from bowdenfit.recordings.preparation.shift_scan import OVERLAP, LateOutput, ShiftScan, scan_shifts
@@ -231,7 +231,8 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
         DatasetError: The motion repeats itself, so that another delay explains the output about as well.
     """
     good = common.fault == GOOD
-    if np.count_nonzero(good) < FEWEST_SAMPLES or _is_opposed(common, good):
+    is_short = np.ptp(common.time) < 2 * RANGE  # no room for a delay beyond the range
+    if is_short or np.count_nonzero(good) < FEWEST_SAMPLES or _is_opposed(common, good):
         return None
     late = _scan(common, good, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
     if late is None:
@@ -253,7 +254,8 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
 
 def _is_opposed(common: CommonClock, good: Flags) -> bool:
     """Return whether the output falls by all that the input rises, as in a pull-pull pair; that is refused later."""
-    forces = common.input_force[good], common.output_force[good]
+    some = slice(None, None, max(1, len(good) // _POINTS_OF_SCAN))
+    forces = [force[some][good[some]] for force in (common.input_force, common.output_force)]
     return all(np.ptp(force) > 0 for force in forces) and float(np.corrcoef(*forces)[0, 1]) < _MIRRORED
 
 

@@ -13,6 +13,7 @@ from bowdenfit.files.headings import find_candidates, heading_of, split_brackets
 from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, find_stated_angle, guess_file_kind
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, FileColumn, LoneFile
+from bowdenfit.recordings.forces import SLOWEST
 from bowdenfit.units import ColumnSource, dimension_of, is_unit, multiple_of, weight_of
 from bowdenfit.words import listed, shown
 
@@ -21,7 +22,6 @@ _SPREAD = re.compile(
 )
 _MOST_NAMED = 8  # judged: columns that may be meant instead, which are listed
 _STEPS = 60  # judged: rows that are enough to see a clock rise in even steps
-_SLOWEST = 2.0  # steps from which a clock counts milliseconds rather than seconds; as `recordings.forces` has it
 _UNEVEN = 3.0  # judged: largest step of a clock over its smallest
 
 
@@ -104,8 +104,8 @@ def _make_table_command(file: LoneFile, kind: str, always: bool = False) -> FitC
         options, provided, missing = _name_forces(could_be, "--column", named, always, in_order)
     angle, of_angle = ([], []) if WRAP_ANGLE.name in file.named else _wrap_angle_options(file)
     names_more = any(name == "--column" for name, _ in (*angle, *options))
-    stated = _state_columns(file, "--column")
-    return FitCommand(file.path, (*angle, *stated, *options), (*of_angle, *provided), names_more, tuple(missing))
+    renamed = _state_columns(file, "--column")
+    return FitCommand(file.path, (*angle, *renamed, *options), (*of_angle, *provided), names_more, tuple(missing))
 
 
 def _make_recording_command(file: LoneFile, always: bool = False) -> FitCommand:
@@ -114,7 +114,7 @@ def _make_recording_command(file: LoneFile, always: bool = False) -> FitCommand:
     signals = [column for column in file.signals if column is not clock]
     options, provided, missing = _name_forces(signals, "--channel", file.named, always, in_order=True)
     if clock is not None:
-        unit = "s" if np.diff(clock.values[:_STEPS]).max() < _SLOWEST else "ms"
+        unit = "s" if np.diff(clock.values[:_STEPS]).max() < SLOWEST else "ms"
         options.append(("--channel", _naming("time", clock.name, unit)))
         provided.append(f"{shown(clock.name)} is the time in {unit}, as the file does not state")
     elif not file.has_clock and "time" not in file.named:
@@ -124,8 +124,8 @@ def _make_recording_command(file: LoneFile, always: bool = False) -> FitCommand:
         options.append(("--channel", _naming("time", file.doubtful_clock, "ms")))
         provided.append(f"{shown(file.doubtful_clock)} is in milliseconds, as the file does not state")
     angle, of_angle = _stated_angle_options(file)
-    stated = _state_columns(file, "--channel")
-    return FitCommand(file.path, (*angle, *stated, *options), (*of_angle, *provided), missing=tuple(missing))
+    renamed = _state_columns(file, "--channel")
+    return FitCommand(file.path, (*angle, *renamed, *options), (*of_angle, *provided), missing=tuple(missing))
 
 
 def _find_unnamed_clock(columns: Sequence[FileColumn]) -> FileColumn | None:
@@ -275,8 +275,8 @@ def _state_columns(file: LoneFile, option: str) -> list[tuple[str, str]]:
 def _stated_angle_options(file: LoneFile) -> tuple[list[tuple[str, str]], list[str]]:
     """Return the option for one wrap angle, as a channel or the file states it or as an example, and what it assumes."""
     measured = (file.angle.option, f"the channel {shown(file.angle.name)}") if file.angle else None
-    stated = measured or find_stated_angle(file.path)
-    if stated is None:
+    stated_angle = measured or find_stated_angle(file.path)
+    if stated_angle is None:
         return [("--wrap-angle", "180deg")], ["180 deg is the wrap angle of the bench"]
-    angle, source = stated
+    angle, source = stated_angle
     return [("--wrap-angle", angle)], [f"{angle} is the wrap angle, as {source} says"]

@@ -95,8 +95,7 @@ class FileColumn:
     @property
     def written_unit(self) -> str:
         """The unit as the file has it, whether it is known or not; empty without one."""
-        other = parse_heading(self.name, self.below)
-        return (other.unit if other else "") or heading_of(self.name, self.below).unit
+        return _find_unit(self.name, self.below)
 
     @property
     def dimension(self) -> str:
@@ -226,9 +225,9 @@ class LoneFile:
                 self._refuse_passed_over()
             return False
         if is_stated:
-            what = f"has a column of wrap angles, {shown(heading)}" if heading else "is to have one"
+            fault = f"has a column of wrap angles, {shown(heading)}" if heading else "is to have one"
             raise DatasetError(
-                f"{self.path.name} {what}, and --wrap-angle states one angle for all rows; leave one of the two out."
+                f"{self.path.name} {fault}, and --wrap-angle states one angle for all rows; leave one of the two out."
             )
         return True
 
@@ -305,14 +304,19 @@ def _columns_of_table(table: RawTable) -> tuple[FileColumn, ...]:
         if not heading:
             continue
         cells, values = [row[i] for row in table.rows], np.array(read_numbers(table, i))
-        other = parse_heading(heading, below)
-        is_time, unit = names_time(heading) and not other, (other.unit if other else "") or heading_of(heading, below).unit
+        is_time, unit = names_time(heading) and not parse_heading(heading, below), _find_unit(heading, below)
         are_numbers = not is_time and 2 * np.count_nonzero(np.isfinite(values)) > len(cells)
         ends = [" ".join(cell.text.split()) for cell in (cells[0], cells[-1])] if cells else ["", ""]
         different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
-        known = unit if unit and is_unit(unit) else ""
-        columns.append(FileColumn(heading, below, known, values, bool(are_numbers), is_time, different, blanks, *ends))
+        valid_unit = unit if unit and is_unit(unit) else ""
+        columns.append(FileColumn(heading, below, valid_unit, values, bool(are_numbers), is_time, different, blanks, *ends))
     return tuple(columns)
+
+
+def _find_unit(heading: str, below: str) -> str:
+    """Return the unit of a column as the file has it; empty without one."""
+    other = parse_heading(heading, below)
+    return (other.unit if other else "") or heading_of(heading, below).unit
 
 
 def _column_of_channel(channel: Channel) -> FileColumn:

@@ -26,7 +26,7 @@ from bowdenfit.words import quoted, shown
 
 _FORCES = ("input_force", "output_force")
 FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
-_SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
+SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
 _MOST_TOGETHER, _FEWEST_ROWS = 0.5, 0.9  # shares of rows with both forces, and with one, in a table that joins two clocks
 _SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
 
@@ -294,8 +294,8 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
     )
     has = f"{file.path.name} has no channel {quantity}; it has {quoted(tuple(c.name for c in file.channels))}."
     headings = [(channel.name, channel.unit) for channel in file.channels if not is_clock(channel)]
-    others = [matches for name, matches in find_candidates(headings, WANTED).items() if name != quantity]
-    taken = {match.position for matches in others for match in matches}
+    found_elsewhere = [matches for name, matches in find_candidates(headings, WANTED).items() if name != quantity]
+    taken = {match.position for matches in found_elsewhere for match in matches}
     headings = [heading for i, heading in enumerate(headings) if i not in taken]
     if not (likely := rank_headings(headings, "force")):
         return DatasetError(f"{has} {other}")
@@ -369,7 +369,7 @@ def _read_clock_without_unit(file: ChannelFile, channel: Channel) -> tuple[Chann
 def clock_in_doubt(file: ChannelFile, channel: Channel) -> Channel | None:
     """Return the clock of a channel where it says no unit and would have the samples seconds apart; None for any other."""
     clock = _read_clock_without_unit(file, channel)
-    return clock[0] if clock is not None and clock[1] >= _SLOWEST else None
+    return clock[0] if clock is not None and clock[1] >= SLOWEST else None
 
 
 def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
@@ -381,7 +381,7 @@ def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
     if (read := _read_clock_without_unit(file, channel)) is None:
         return
     clock, step, length = read
-    if step >= _SLOWEST:
+    if step >= SLOWEST:
         units = ["ms", "s"]
         last = f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s"
     elif 0 < length < _SHORTEST:

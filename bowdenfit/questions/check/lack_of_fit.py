@@ -227,8 +227,8 @@ def _suggest_curve(fit: Record, column: str) -> str:
     number, contact = next((i, c) for i, c in enumerate(contacts) if c.wrap_angle.column == column)
     family, smooth = contact.wrap_angle.curve, f"--set contact.{number}.wrap_angle.departure=smooth"
     has_family = contact.wrap_angle.departure is not None  # a smooth curve has none to depart from
-    others = [name for name in CURVES if name != family and not (has_family and name == "smooth")]
-    fitting = [name for name in others if curve_family_fits(fit.dataset, number, name)]
+    families = [name for name in CURVES if name != family and not (has_family and name == "smooth")]
+    fitting = [name for name in families if curve_family_fits(fit.dataset, number, name)]
     departs = fit.dataset.description.departs(contact.wrap_angle)
     if fitting:
         flags = " or ".join(f"--set contact.{number}.wrap_angle.curve={name}" for name in fitting)
@@ -240,7 +240,7 @@ def _suggest_curve(fit: Record, column: str) -> str:
             "do, or measure the angle with each run."
         )
     return (
-        f"Neither a {family} curve nor any other family ({listed(others)}) follows these angles; fit again with {smooth}, "
+        f"Neither a {family} curve nor any other family ({listed(families)}) follows these angles; fit again with {smooth}, "
         "narrow the range under [route], or measure the angle with each run."
     )
 

@@ -80,11 +80,11 @@ def _describe_readings(file: LoneFile, reading: Reading) -> tuple[str, bool]:
     has_angles = file.has_own_angles(is_stated=False)
     strict = any(reading.values()) and not command.names_more
     names_angle = any(argument.startswith("wrap_angle=") for argument in command.arguments("--column"))
-    stated = {**reading, "wrap_angle": None if has_angles or names_angle else ANY_ANGLE}
-    data, obstacle = _try_as_data_set(file.path, cast(Reading, stated), strict)
+    options = {**reading, "wrap_angle": None if has_angles or names_angle else ANY_ANGLE}
+    data, obstacle = _try_as_data_set(file.path, cast(Reading, options), strict)
     remaining = obstacle
     if obstacle and command.names_more:
-        named = {**stated, "columns": command.arguments("--column")}
+        named = {**options, "columns": command.arguments("--column")}
         _, remaining = _try_as_data_set(file.path, cast(Reading, named), False)
         obstacle += f"\n{remaining}" if remaining not in obstacle else ""
     if obstacle and (backwards := _backward_clock(file.path)):
@@ -156,10 +156,10 @@ def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading
     """Describe a recording alone; and return whether it can be fitted as it stands."""
     (command,) = make_commands(file)
     missing = reading.get("missing", ())
-    stated = ANY_ANGLE if file.angle is None else (file.angle.angle, "rad")
+    wrap_angle = ANY_ANGLE if file.angle is None else (file.angle.angle, "rad")
     recordings, obstacle, notes = None, "", list[str]()
     try:
-        data = single_file_dataset(file.path, stated, (), file.named, kind="recordings", missing=missing)
+        data = single_file_dataset(file.path, wrap_angle, (), file.named, kind="recordings", missing=missing)
         recordings = data.measurements.table(Recordings)
         of_rows = [remark for account in data.accounts for remark in account.remarks]
         notes = [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in of_rows]

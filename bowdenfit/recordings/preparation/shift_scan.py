@@ -81,12 +81,12 @@ class ShiftScan:
         """Return another shift that fits about as well as the best, with worse ones between them; None if there is none."""
         as_well = self.unexplained < AS_WELL * self.best[1]
         best, worse = int(np.argmin(self.unexplained)), np.flatnonzero(~as_well)
-        at = int(np.searchsorted(worse, best))
-        first, last = (worse[at - 1] + 1 if at else 0), (worse[at] if at < len(worse) else len(as_well))
+        after = int(np.searchsorted(worse, best))
+        first, last = (worse[after - 1] + 1 if after else 0), (worse[after] if after < len(worse) else len(as_well))
         as_well[first:last] = False
         as_well &= np.abs(self.shift - self.shift[best]) > self.near
-        others = np.flatnonzero(as_well)
-        return float(self.shift[others[np.argmin(self.unexplained[others])]]) if len(others) else None
+        rivals = np.flatnonzero(as_well)
+        return float(self.shift[rivals[np.argmin(self.unexplained[rivals])]]) if len(rivals) else None
 
     def late_output(self, *, is_beyond: bool) -> LateOutput | None:
         """Return by how much an output is late beyond the range of `delay`.

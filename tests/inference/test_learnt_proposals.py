@@ -9,10 +9,10 @@ from own_angle_tables import of_rows
 from scipy import stats
 
 from bowdenfit.description import PriorDefaults
-from bowdenfit.inference.batch.laplace import StudentMixture, start_mixture
 from bowdenfit.inference.batch.programs import BatchPrograms
 from bowdenfit.inference.batch.weights import BLOCK, LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.student_mixture import StudentMixture, start_mixture
 from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS, _compilation_key
 

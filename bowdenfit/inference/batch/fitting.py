@@ -18,7 +18,7 @@ import jax
 import numpy as np
 
 from bowdenfit.inference import nuts
-from bowdenfit.inference.batch.laplace import StudentMixture, fit_mixtures
+from bowdenfit.inference.batch.laplace import fit_mixtures
 from bowdenfit.inference.batch.programs import (
     STATES_PER_ROUND,
     STEPS_PER_ROUND,
@@ -46,6 +46,7 @@ from bowdenfit.inference.diagnostics import (
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.resources import linear_algebra_in_one_thread
+from bowdenfit.inference.student_mixture import StudentMixture
 from bowdenfit.words import percent
 
 _FIRST_CHECK = 3  # rounds of walkers before convergence is first checked

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from bowdenfit.inference.batch.laplace import StudentMixture, start_mixture
 from bowdenfit.inference.diagnostics import Diagnostics, describe_low_ess
 from bowdenfit.inference.psis import reliable_k, smooth_weights
+from bowdenfit.inference.student_mixture import StudentMixture, start_mixture
 
 _PRIOR_SHARE = 0.05  # share of the prior in the first proposal, which bounds the weights
 _MAXIMA_SHARE = 0.1  # share of the first proposal in learnt ones

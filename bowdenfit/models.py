@@ -46,6 +46,11 @@ class Model(Display):
         """The description of the cable."""
         return self.cable.description
 
+    @property
+    def is_slow(self) -> bool:
+        """Whether one log density takes milliseconds; see `Term`."""
+        return any(getattr(term, "is_slow", False) for term in self.terms)
+
     def sentences(self) -> list[str]:
         """Free parameters and readings by table."""
         terms = listed([f"{len(term.labels)} of {term.name.replace('_', ' ')}" for term in self.terms])

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from bowdenfit.description.values import Frozen, LogNormalPrior, NonNegative, Positive, QuantityValue
 
-Sampler = Literal["emcee", "nuts", "both"]
+Sampler = Literal["emcee", "nuts", "importance", "both"]
 FEWEST_WALKERS = 128  # of an ensemble, where nothing is said of it; twice as many cost twice as much and settle no sooner
 WALKERS_PER_PARAMETER = 4  # so that a distribution can be fitted to half of them
 THIN = 10  # steps of a walker from one state that is stored to the next; draws are those of the second half
@@ -109,11 +109,14 @@ class BenchErrors(Frozen):
 class SamplerSettings(Frozen):
     """How long and how carefully the posterior is sampled, by emcee's ensembles of walkers, by NUTS, or by both.
 
+    Where no method is stated, walkers do. Where one density takes milliseconds (dahl and lugre), importance sampling does, and
+    walkers only if its draws do not suffice.
+
     `max_steps` is that of each walker or chain, and does not count the warm-up of NUTS. Walkers of which nothing is said are
     as many as it takes to fit a distribution to half of them, and enough to draw from at the first look.
     """
 
-    method: Sampler = "emcee"
+    method: Sampler | None = None
     n_ensembles: Annotated[int, Field(ge=2, le=100)] = 4
     n_walkers: Annotated[int, Field(ge=16, le=10_000, multiple_of=2)] | None = None
     n_chains: Annotated[int, Field(ge=4, le=1000)] = 16
@@ -130,7 +133,7 @@ class SamplerSettings(Frozen):
         """Numbers in all states after `max_steps`, for so many parameters; of two samplers the more."""
         of_walkers = self.n_ensembles * self.walkers(size) * size * self.max_steps // THIN
         of_chains = self.n_chains * size * self.max_steps
-        return {"emcee": of_walkers, "nuts": of_chains, "both": max(of_walkers, of_chains)}[self.method]
+        return {"nuts": of_chains, "both": max(of_walkers, of_chains)}.get(self.method or "emcee", of_walkers)
 
     def kept_draws(self, size: int) -> int:
         """Draws that a fit of so many parameters keeps."""
@@ -142,7 +145,7 @@ class SamplerSettings(Frozen):
         """Draws that there can be after `max_steps`, even if none depended on the one before; of two samplers the fewer."""
         of_walkers = self.n_ensembles * self.walkers(0) * self.max_steps // (2 * THIN)
         of_chains = self.n_chains * self.max_steps
-        return {"emcee": of_walkers, "nuts": of_chains, "both": min(of_walkers, of_chains)}[self.method]
+        return {"nuts": of_chains, "both": min(of_walkers, of_chains)}.get(self.method or "emcee", of_walkers)
 
 
 class PriorDefaults(Frozen):

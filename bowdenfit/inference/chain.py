@@ -15,13 +15,23 @@ from bowdenfit.inference.log_density import LogDensity
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of sampling, for a progress bar; R-hat and effective sample size once they have been computed."""
+    """Progress of sampling, for a progress bar.
+
+    Args:
+        steps: Steps so far.
+        max_steps: Most steps.
+        r_hat: Largest R-hat, once it has been computed.
+        ess: Smallest effective sample size, likewise.
+        sampler: Its name.
+        seconds_left: About how long sampling takes at least from now on [s], judged by what it took so far; None if unknown.
+    """
 
     steps: int
     max_steps: int
     r_hat: float | None
     ess: float | None
     sampler: str = "emcee"
+    seconds_left: float | None = None
 
 
 @dataclass(frozen=True)
@@ -29,15 +39,18 @@ class Chain:
     """Draws of the posterior after burn-in.
 
     Args:
-        z: Draws in z, (ensemble x walker, draw, parameter); a NUTS chain counts as an ensemble of one walker.
+        z: Draws in z, (ensemble x walker, draw, parameter); a NUTS chain, or a batch of weighted draws, counts as an ensemble
+            of one walker.
         quantities: Named derived quantities at every draw, (ensemble x walker, draw).
         diagnostics: Diagnostics of parameters and derived quantities.
         n_ensembles: Number of independent ensembles.
         steps: Steps taken by each walker; for NUTS, without warm-up.
-        acceptance: Mean fraction of accepted proposals; for NUTS, mean acceptance along trajectories.
+        acceptance: Mean fraction of accepted proposals; for NUTS, mean acceptance along trajectories; for importance sampling,
+            effective draws per draw.
         reasons: Why the draws should not be trusted; empty if they can be.
-        sampler: "emcee" or "nuts".
+        sampler: "emcee", "nuts" or "importance".
         trajectories: Statistics of the trajectories of NUTS.
+        pareto_k: Pareto k of the weights of importance sampling.
     """
 
     z: np.ndarray
@@ -49,6 +62,7 @@ class Chain:
     reasons: tuple[str, ...]
     sampler: str = "emcee"
     trajectories: Trajectories | None = None
+    pareto_k: float | None = None
 
 
 @dataclass(frozen=True)

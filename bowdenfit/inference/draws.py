@@ -1,7 +1,7 @@
 """Functions of posterior draws: named values, curves, forces and replicated readings, compiled for many draws at a time."""
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import Any, TypeAlias
 
 import jax
@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.resources import available_cores
 from bowdenfit.models import Model
 
 PRIOR_DRAWS = 4096  # of which 205 lie beyond either end of a 90 % interval; a judgement
@@ -23,11 +24,16 @@ DrawFunction: TypeAlias = Callable[[np.ndarray], Any]
 
 
 def for_each_draw(
-    function: Function, size: int, *data: Any, run_once: bool = False, beside: Executor | None = None
+    function: Function,
+    size: int,
+    *data: Any,
+    run_once: bool = False,
+    run_often: bool = False,
+    beside: Executor | None = None,
 ) -> DrawFunction:
     """Compile `function` of one z (and of data that are the same for all) to be applied to any number of z (rows)."""
     over_rows, rows = jax.vmap(function, in_axes=(0, *(None for _ in data))), jax.ShapeDtypeStruct((BATCH, size), float)
-    program = compile_program(over_rows, rows, *data, run_once=run_once, beside=beside)
+    program = compile_program(over_rows, rows, *data, run_once=run_once, run_often=run_often, beside=beside)
     return lambda z: run_in_batches(lambda part: program(part, *data), BATCH, z)
 
 
@@ -48,12 +54,16 @@ def for_each_value(function: Function, values: Mapping[str, np.ndarray], *data: 
 
 
 def run_in_batches(program: Function, batch: int, rows: Any) -> Any:
-    """Run a program that is compiled for `batch` rows, of one array or of several, on any number of rows."""
-    parts, count = [], len(jax.tree.leaves(rows)[0])
-    for start in range(0, count, batch):
+    """Run a program that is compiled for `batch` rows, of one array or of several, on any number of rows, on all cores."""
+    count = len(jax.tree.leaves(rows)[0])
+
+    def run_batch(start: int) -> Any:
         padded = np.minimum(np.arange(start, start + batch), count - 1)
-        part = jax.tree.map(lambda array, padded=padded: array[padded], rows)
-        parts.append(jax.tree.map(np.asarray, program(part)))
+        with jax.enable_x64(True):  # the setting is each thread's own
+            return jax.tree.map(np.asarray, program(jax.tree.map(lambda array: array[padded], rows)))
+
+    with ThreadPoolExecutor(available_cores()) as threads:
+        parts = list(threads.map(run_batch, range(0, count, batch)))
     whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
     return jax.tree.map(lambda x: x[:count], whole)
 
@@ -98,8 +108,9 @@ def compile_replicator(posterior: LogDensity, seed: int, beside: Executor | None
             "replicated": {t.name: t.simulate(values, d, key) for t, d, key in terms},
         }
 
-    small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(predict, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
+    slow, small = model.is_slow, sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
+    options: Any = {"run_once": small and not slow, "run_often": slow, "beside": beside}
+    program = for_each_draw(predict, model.space.size + 1, posterior.data, key, **options)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 

@@ -10,6 +10,7 @@ ensemble in one compiled program; with one call a step, more than half of the ti
 ensembles of its own, because one program for all of them used two cores in turns rather than at once.
 """
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -114,11 +115,14 @@ def sample(request: SamplingRequest, programs: WalkerPrograms, data: Any = None)
         target = _next_check(target)
     target = min(target, limit)
     worst: tuple[float | None, float | None] = (None, None)
+    begin, stored_before = time.monotonic(), int(backend.iteration)
     while True:
         while (missing := target - int(backend.iteration)) > 0:
             sampler.run_mcmc(state, min(missing, _BLOCK), skip_initial_state_check=True)
             state = None
-            request.report(Progress(int(backend.iteration) * THIN, settings.max_steps, *worst))
+            stored = int(backend.iteration)
+            seconds_left = (time.monotonic() - begin) * (target - stored) / (stored - stored_before)
+            request.report(Progress(stored * THIN, settings.max_steps, *worst, seconds_left=seconds_left))
         chain = _summarize(request, backend)
         worst = worst_diagnostics(chain)
         request.report(Progress(chain.steps, settings.max_steps, *worst))

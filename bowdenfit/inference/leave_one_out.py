@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
+from bowdenfit.inference import importance
 from bowdenfit.inference.chain import Chain, SamplingRequest
 from bowdenfit.inference.comparison import LooMethod, LooPrediction, psis_loo
 from bowdenfit.inference.compilation import compile_program
@@ -20,6 +21,7 @@ from bowdenfit.inference.coordinates import maps_without_ridge
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import run_in_batches
 from bowdenfit.inference.ensemble import sample
+from bowdenfit.inference.importance import Densities, compile_densities
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.psis import match_moments, reliable_k, smooth_weights
@@ -89,17 +91,21 @@ class LooDensity:
 
     @cached_property
     def _program(self) -> Callable[..., Any]:
-        shape = jax.ShapeDtypeStruct((_ROWS, self.posterior.model.space.size), jnp.float64)
-        return compile_program(jax.vmap(self._density, (0, None)), shape, self.data_without(None))
+        model = self.posterior.model
+        shape, slow = jax.ShapeDtypeStruct((_ROWS, model.space.size), jnp.float64), model.is_slow
+        return compile_program(jax.vmap(self._density, (0, None)), shape, self.data_without(None), run_often=slow)
 
     @cached_property
-    def programs(self) -> WalkerPrograms:
-        """Compiled walkers of fits without a reading."""
-        space = self.posterior.model.space
-        arguments, frames = self.data_without(None), maps_without_ridge(space)
-        return compile_density_walkers(
-            lambda z, arguments: self._density(z, arguments)[0], arguments, space.size, self.refits, frames
-        )
+    def programs(self) -> WalkerPrograms | Densities:
+        """Compiled walkers of fits without a reading, or densities for importance sampling."""
+        space, data = self.posterior.model.space, self.data_without(None)
+
+        def log_density(z: Array, data: Any) -> Array:
+            return self._density(z, data)[0]
+
+        if self.posterior.model.is_slow:
+            return compile_densities(log_density, data, space.size)
+        return compile_density_walkers(log_density, data, space.size, self.refits, maps_without_ridge(space))
 
     def data_without(self, reading: int | None) -> tuple[Any, Any, np.ndarray]:
         """Return data of the density without one reading, or with all."""
@@ -182,7 +188,10 @@ class LooRefits:
         request = SamplingRequest(
             density.posterior, start, density.refits, own_seed, quantities, diagnose=_diagnose_without_drift
         )
-        return sample(request, density.programs, density.data_without(reading))
+        data, programs = density.data_without(reading), density.programs
+        if isinstance(programs, Densities):
+            return importance.sample(request, replace(programs, data=data))
+        return sample(request, programs, data)
 
 
 def leave_one_out(

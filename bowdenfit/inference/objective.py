@@ -39,7 +39,8 @@ def make_objective(posterior: LogDensity) -> Objective:
     rows = sum(count for term in posterior.model.terms for count, _ in term.residual_blocks)
     with ThreadPoolExecutor(1) as thread:
         thread.submit(compile_solver, rows + space.size, space.size)
-        program = compile_program(_evaluation_program(posterior), vector, vector, posterior.data, run_once=True)
+        slow, shapes = posterior.model.is_slow, (vector, vector, posterior.data)
+        program = compile_program(_evaluation_program(posterior), *shapes, run_once=not slow, run_often=slow)
 
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, precision: Precision

@@ -32,6 +32,16 @@ def reliable_k(n_draws: int) -> float:
     return min(1 - 1 / np.log10(n_draws), RELIABLE_K) if n_draws > 10 else 0.0
 
 
+def describe_uneven_weights(pareto_k: float, n_draws: int) -> tuple[str, ...]:
+    """Say that importance weights cannot be trusted; empty if they can."""
+    if pareto_k <= reliable_k(n_draws):
+        return ()
+    return (
+        f"the importance weights are too uneven: Pareto k is {pareto_k:.2f}, and at most {reliable_k(n_draws):.2f} can be "
+        "trusted",
+    )
+
+
 def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarray, float]:
     """Return smoothed log weights, whose exponentials sum to 1, and Pareto k.
 

@@ -12,7 +12,7 @@ from bowdenfit.inference.diagnostics import array_stats
 FALSE_ALARM = 0.001  # probability that two correct samplers are reported to disagree
 SUMMARIES = ("mean", "sd", "5 % quantile", "95 % quantile")
 NOTICEABLE = 0.1  # standard deviations; smaller differences do not change an answer; a judgement
-SAMPLER_NAMES = {"emcee": "emcee", "nuts": "NUTS"}
+SAMPLER_NAMES = {"emcee": "emcee", "nuts": "NUTS", "importance": "importance sampling"}
 MANY_PARAMETERS = 25  # parameters above which ensembles of walkers mix slowly; a judgement
 
 
@@ -179,7 +179,9 @@ def _standard_errors(draws: np.ndarray) -> list[float]:
 
 
 def recommend_sampler(sampler: str, n_parameters: int, short: bool) -> str:
-    """Recommend the other sampler where emcee has not converged, or probably will not; empty otherwise."""
+    """Recommend another sampler where draws have not converged, or probably will not; empty otherwise."""
+    if sampler == "importance" and short:
+        return "The weighted draws do not suffice. Walkers take far longer and need no weights: fit again with --sampler emcee."
     if sampler != "emcee":
         return ""
     if short:

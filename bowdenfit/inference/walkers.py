@@ -169,12 +169,13 @@ def compile_walkers(
     """
     space = posterior.model.space
     arguments = posterior.log_density, posterior.data, space.size, settings
+    options: Any = {"beside": beside, "run_often": posterior.model.is_slow}
     if moves is not None:
-        return compile_density_walkers(*arguments, ((z_map, 1.0),), moves, beside)
+        return compile_density_walkers(*arguments, ((z_map, 1.0),), moves, **options)
     if Conditional(posterior).is_narrow:
-        return compile_density_walkers(*arguments, coordinate_maps(posterior), beside=beside)
+        return compile_density_walkers(*arguments, coordinate_maps(posterior), **options)
     plain = maps_without_ridge(space)
-    first = compile_density_walkers(*arguments, plain, beside=beside)
+    first = compile_density_walkers(*arguments, plain, **options)
 
     @cache
     def later() -> WalkerPrograms:
@@ -192,6 +193,7 @@ def compile_density_walkers(
     frames: CoordinateMaps,
     moves: Moves | None = None,
     beside: Executor | None = None,
+    run_often: bool = False,
 ) -> WalkerPrograms:
     """Compile the walkers of any density.
 
@@ -202,11 +204,11 @@ def compile_density_walkers(
         settings: Sampler settings, for the number of walkers.
         frames: The coordinates.
         moves: `default_moves` if omitted.
-        beside: See `compile_program`.
+        beside, run_often: See `compile_program`.
     """
     shape = settings.walkers(size), size
     moves = moves or default_moves(size, shape[0])
     shares = MoveShares(*(tuple(share for _, share in weighted) for weighted in (moves, frames)))
     choices = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
     sweep, z = make_walker_sweep(log_density, moves, frames), jax.ShapeDtypeStruct(shape, jnp.float64)
-    return WalkerPrograms(compile_program(sweep, choices, z, data, beside=beside), shares)
+    return WalkerPrograms(compile_program(sweep, choices, z, data, beside=beside, run_often=run_often), shares)

@@ -44,6 +44,7 @@ class Term(Protocol):
 
     It may also have `depends_on_conditions`: whether its functions depend on `cable.friction.conditions`. Where it is False,
     one compiled program serves data sets that were measured at different loads and speeds; without it they have one each.
+    And `is_slow`: whether one log likelihood takes milliseconds, because it follows a recording through thousands of steps.
     """
 
     @property

@@ -199,7 +199,7 @@ def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> dict[BenchE
             return sum((jnp.sum(part) for part in posterior.log_likelihoods(z, data).values()), jnp.zeros(()))
 
         rows = jax.ShapeDtypeStruct((BATCH, z.shape[1]), float)
-        program = compile_program(jax.vmap(log_likelihood, in_axes=(0, None)), rows, data)
+        program = compile_program(jax.vmap(log_likelihood, in_axes=(0, None)), rows, data, run_often=fit.model.is_slow)
         changes = {}
         before = run_in_batches(lambda part: program(part, data), BATCH, z)
         for error in errors:

@@ -52,7 +52,7 @@ class Draws(Display):
         n_ensembles: Number of independent ensembles.
         steps: Steps of every walker; of NUTS, without warm-up.
         acceptance: Mean fraction of accepted proposals; of NUTS, mean acceptance along trajectories.
-        sampler: "emcee" or "nuts", whose chains are ensembles of one walker each.
+        sampler: "emcee", "importance" or "nuts", whose chains are ensembles of one walker each.
         trajectories: How the trajectories of NUTS went.
         agreement: Whether a second sampler agrees, where one was asked.
         units: Units of values and optimum by name, where a fit gives them.
@@ -71,6 +71,7 @@ class Draws(Display):
     acceptance: float
     sampler: str = "emcee"
     trajectories: Trajectories | None = None
+    pareto_k: float | None = None
     agreement: SamplerAgreement | None = None
     units: dict[str, str] = field(default_factory=dict)
 

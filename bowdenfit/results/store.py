@@ -38,10 +38,10 @@ if TYPE_CHECKING:
 
 SCHEMA = 7  # counted up with every change of what files mean
 LOG_POSTERIOR, WALKER = "lp", "walker"
-_SAMPLERS = "emcee", "nuts"
+_SAMPLERS = "emcee", "nuts", "importance"
 _WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
-COUNTS = ("n_ensembles", "steps", "acceptance", "sampler", "trajectories", "agreement", "diagnostics")
+COUNTS = ("n_ensembles", "steps", "acceptance", "sampler", "trajectories", "pareto_k", "agreement", "diagnostics")
 
 
 def save(

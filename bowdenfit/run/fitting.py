@@ -18,6 +18,7 @@ from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.chain import Chain, SamplingRequest
 from bowdenfit.inference.draws import PREDICTED_GROUPS, compile_replicator, for_each_draw, imply_groups
 from bowdenfit.inference.engines import installed_versions
+from bowdenfit.inference.importance import compile_densities
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
@@ -32,8 +33,9 @@ from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 from bowdenfit.stages import announce_stage
 
 _SLOW_IMPORTS = ("emcee", "arviz_stats.base", "arviz_stats.ecdf_utils")  # which get their time while XLA compiles
-LIBRARIES = {"emcee": "emcee", "nuts": "blackjax"}
-_MODULES = {"emcee": "bowdenfit.inference.ensemble", "nuts": "bowdenfit.inference.nuts"}
+LIBRARIES = {"emcee": "emcee", "nuts": "blackjax", "importance": "the sampler"}
+_MODULES = {name: f"bowdenfit.inference.{module}" for name, module in
+            (("emcee", "ensemble"), ("nuts", "nuts"), ("importance", "importance"))}  # fmt: skip
 
 
 @dataclass
@@ -150,8 +152,9 @@ def provenance(seed: int, watch: Stopwatch) -> Provenance:
     return Provenance(seed, dict(installed_versions()), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
 
 
-def samplers_of(method: str) -> tuple[str, ...]:
-    """Return the samplers that a method runs, in their order; the draws of the first are the result."""
+def samplers_of(model: Model) -> tuple[str, ...]:
+    """Return the samplers that are run, in their order; the draws of the first are the result."""
+    method = model.description.sampler.method or ("importance" if model.is_slow else "emcee")
     return ("emcee", "nuts") if method == "both" else (method,)
 
 
@@ -179,9 +182,11 @@ class Programs:
 def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Programs:
     """Compile the programs that sampling needs and, in an executor beside it, those that its draws will need."""
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Any]()
-    for name in samplers_of(settings.method):
+    for name in samplers_of(model):
         if name == "emcee":
             programs[name] = compile_walkers(density, settings, beside=beside)
+        elif name == "importance":
+            programs[name] = compile_densities(density.log_density, density.data, model.space.size)
         else:
             programs[name] = import_module(_MODULES[name]).compile_nuts(density, settings)
     optimum = for_each_draw(make_optimizer(model), model.space.size, beside=beside) if model.description.route else None
@@ -197,7 +202,10 @@ def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatc
         with watch.stage(f"loading {LIBRARIES[name]}"):
             sampler = import_module(_MODULES[name])
         with watch.stage(f"sampling with {SAMPLER_NAMES[name]}" if chains else "sampling"):
-            chains.append(sampler.sample(request, program))
+            chain = sampler.sample(request, program)
+        if chain.reasons and name == "importance" and request.settings.method is None:
+            chain = _sample_by_walkers(request, watch)
+        chains.append(chain)
     with watch.stage("predicting readings"):
         posterior = _posterior(model, chains[0], programs.draw_programs.quantities, request.seed)
     if len(chains) == 1:
@@ -206,6 +214,15 @@ def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatc
         agreement = compare_samplers(*(_sampler_draws(model, chain) for chain in chains))
     of_other = [f"{SAMPLER_NAMES[chains[1].sampler]}: {reason}" for reason in chains[1].reasons]
     return replace(posterior, agreement=agreement), (*chains[0].reasons, *of_other, *agreement.reasons())
+
+
+def _sample_by_walkers(request: SamplingRequest, watch: Stopwatch) -> Chain:
+    """Sample with walkers, since weighted draws do not suffice."""
+    with watch.stage("compiling walkers, since weighted draws do not suffice"):
+        programs = compile_walkers(request.posterior, request.settings)
+    with watch.stage("sampling with walkers"):
+        chain: Chain = import_module(_MODULES["emcee"]).sample(request, programs)
+    return chain
 
 
 def _sampler_draws(model: Model, chain: Chain) -> SamplerDraws:

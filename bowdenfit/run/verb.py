@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bowdenfit.frames import Frame
     from bowdenfit.inference.chain import Progress
 
-Sampler = Literal["emcee", "nuts", "both"]
+Sampler = Literal["emcee", "nuts", "importance", "both"]
 
 
 @read_first
@@ -34,7 +34,7 @@ def fit(
     *,
     output: Annotated[Output, Parameter(show_default="fits/NAME OF DATASET")] = None,
     mcmc: Annotated[bool, Parameter(negative="--no-mcmc")] = True,
-    sampler: Annotated[Sampler | None, Parameter(show_default="as in cable.toml, else emcee")] = None,
+    sampler: Annotated[Sampler | None, Parameter(show_default="as in cable.toml, else by the model")] = None,
     figures: Annotated[bool, Parameter(negative="--no-figures")] = True,
     seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
     resume: bool = False,
@@ -95,14 +95,18 @@ def _reply(fit: "Fit", request: dict[str, Any]) -> Reply:
 
 
 def _show(bar: Any, progress: "Progress") -> None:
-    """Show steps, R-hat (how much all chains spread beyond one), and the effective sample size."""
-    bar.n = progress.steps
+    """Show steps, R-hat (how much all chains spread beyond one), the effective sample size, and the minutes left if many."""
+    bar.n, words = progress.steps, list[str]()
     bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
     if progress.r_hat is not None and progress.ess is not None:
-        bar.set_postfix_str(f"R-hat {progress.r_hat:.3f}, {progress.ess:.0f} effective draws", refresh=False)
+        words.append(f"R-hat {progress.r_hat:.3f}, {progress.ess:.0f} effective draws")
+    if progress.seconds_left is not None and progress.seconds_left > _LONG:
+        words.append(f"at least {progress.seconds_left / 60:.0f} min left")
+    bar.set_postfix_str(", ".join(words), refresh=False)
     bar.refresh()
 
 
+_LONG = 60  # seconds of sampling from which the bar says how long it takes
 _BAR = {"unit": "step", "desc": "sampling", "bar_format": "{desc} {n_fmt} steps, {elapsed}{postfix}"}
 WATCH = Watch(CHAIN, "the checkpoint is kept in", _BAR, _show, FIT)
 VERB = Verb(

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from bowdenfit.inference.diagnostics import Diagnostics, describe_low_ess
-from bowdenfit.inference.psis import reliable_k, smooth_weights
+from bowdenfit.inference.psis import describe_uneven_weights, reliable_k, smooth_weights
 from bowdenfit.inference.student_mixture import StudentMixture, start_mixture
 
 _PRIOR_SHARE = 0.05  # share of the prior in the first proposal, which bounds the weights
@@ -168,18 +168,7 @@ class WeightedDraws:
 
     def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
         """Return diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
-        weights = np.exp(self.log_weights)
-        squares, apart = weights**2, (self.z - weights @ self.z) ** 2
-        error, ends = squares @ apart, np.quantile(self.z[resample(weights, BLOCK, 0.5)], _TAILS, axis=0)
-        tails = [p * (1 - p) / (squares @ ((self.z <= at) - p) ** 2) for p, at in zip(_TAILS, ends, strict=True)]
-        bulk = (weights @ apart) / np.maximum(error, np.finfo(float).tiny)
-        unknown = float("nan")
-        return {
-            name: Diagnostics(
-                unknown, float(bulk[i]), float(min(t[i] for t in tails)), float(np.sqrt(error[i])), unknown
-            )
-            for i, name in enumerate(names)
-        }
+        return diagnose_weighted(self.z, np.exp(self.log_weights), names)
 
     def estimate_sd_errors(self, names: tuple[str, ...]) -> dict[str, float]:
         """Return relative errors of standard deviations (section 3.2.3, of the squared deviations)."""
@@ -191,17 +180,32 @@ class WeightedDraws:
 
     def describe_shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
         """Describe why the draws should not be trusted; empty if they can be."""
-        reasons = []
-        if not self.is_reliable:
-            reasons.append(
-                f"the importance weights are too uneven: Pareto k is {self.pareto_k:.2f}, and at most "
-                f"{reliable_k(len(self.z)):.2f} can be trusted"
-            )
+        reasons = list(describe_uneven_weights(self.pareto_k, len(self.z)))
         for name, d in diagnostics.items():
             low = min(d.ess_bulk, d.ess_tail)
             if not low >= target_ess:
                 reasons.append(describe_low_ess(name, low, target_ess))
         return tuple(reasons)
+
+
+def diagnose_weighted(values: np.ndarray, weights: np.ndarray, names: tuple[str, ...]) -> dict[str, Diagnostics]:
+    """Return diagnostics of weighted draws by quantity; those have no R-hat and no drift (section 3.2.3 for the errors).
+
+    Args:
+        values: Values of every quantity, (draw, quantity).
+        weights: Weights of the draws, which sum to 1.
+        names: Names of the quantities.
+    """
+    squares, apart = weights**2, (values - weights @ values) ** 2
+    error, ends = squares @ apart, np.quantile(values[resample(weights, BLOCK, 0.5)], _TAILS, axis=0)
+    tails = [p * (1 - p) / (squares @ ((values <= at) - p) ** 2) for p, at in zip(_TAILS, ends, strict=True)]
+    bulk = (weights @ apart) / np.maximum(error, np.finfo(float).tiny)
+    bulk = np.where(np.ptp(values, axis=0) > 0, bulk, len(values))  # such as an optimum always at the edge
+    unknown = float("nan")
+    return {
+        name: Diagnostics(unknown, float(bulk[i]), float(min(t[i] for t in tails)), float(np.sqrt(error[i])), unknown)
+        for i, name in enumerate(names)
+    }
 
 
 def _list_fields(draws: WeightedDraws) -> tuple[np.ndarray, ...]:

@@ -16,7 +16,7 @@ steps a block, along the parabola that has the means of the block and of its nei
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -42,6 +42,8 @@ _SAME_STEP = 1e-3  # relative difference of times between blocks that are evenly
 @dataclass(frozen=True)
 class TurnsTerm(WholeRecordingsTerm):
     """Likelihood of every block of whole recordings of a single rope, standing phases by how the output moves in them."""
+
+    is_slow: ClassVar = True
 
     @override
     def _drive(self, values: Values, data: Data) -> tuple[RopeDrive | LoopDrive, Array, Array]:

@@ -101,7 +101,7 @@ class RecordingFollower:
         values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.items)), jnp.float64)
         function = jax.vmap(_make_follow_function(model), in_axes=(0, 0, None))
-        self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data)
+        self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data, run_often=model.is_slow)
 
     def __call__(
         self, values: Mapping[str, np.ndarray], mounting: Float[np.ndarray, "draws recordings"]

@@ -30,6 +30,8 @@ REFERENCES = {
     "doi:10.1214/24-BA1453.",
     "left-out": "A. Vehtari, A. Gelman and J. Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation "
     "and WAIC, Statistics and Computing 27 (2017), 1413-1432, doi:10.1007/s11222-016-9696-4.",
+    "psis": "A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importance sampling, Journal of Machine "
+    "Learning Research 25 (2024), 1-58.",
     "optimistix": "J. Rader, T. Lyons and P. Kidger, Optimistix: modular optimisation in JAX and Equinox (2024), "
     "arXiv:2402.09983.",
     "jax": "J. Bradbury et al., JAX: composable transformations of Python+NumPy programs, version {jax}.",
@@ -129,15 +131,18 @@ def _sampler_phrase(posterior: Draws) -> str:
         "ensembles": posterior.n_ensembles,
         "walkers": len(posterior.z) // posterior.n_ensembles,
     }
-    page |= {"steps": posterior.steps} | {key: value for key, value in trajectories.items() if key != "statistics"}
+    page |= {"steps": posterior.steps, "pareto_k": posterior.pareto_k}
+    page |= {key: value for key, value in trajectories.items() if key != "statistics"}
     words = sampler_text(page)
-    return f"{words} [nuts] [blackjax]" if posterior.sampler == "nuts" else f"emcee [emcee], {words}"
+    cited = {"nuts": f"{words} [nuts] [blackjax]", "importance": f"{words} [psis]"}
+    return cited.get(posterior.sampler, f"emcee [emcee], {words}")
 
 
 def _convergence_sentence(fit: Record, posterior: Draws) -> str:
     """Say which limits of convergence were reached."""
     settings = fit.dataset.description.sampler
-    r_hat = "rank-normalized R-hat [r-hat]" if posterior.sampler == "nuts" else "rank-normalized, nested R-hat [r-hat] [nested]"
+    nested = posterior.sampler == "emcee"
+    r_hat = "rank-normalized, nested R-hat [r-hat] [nested]" if nested else "rank-normalized R-hat [r-hat]"
     limits = f"{r_hat} below {settings.target_r_hat:g} and effective sample sizes of at least {settings.target_ess}"
     if not fit.converged:
         return f"Convergence, which is {limits} for every parameter, was NOT reached."
@@ -158,6 +163,9 @@ def sampler_text(sampler: dict[str, Any]) -> str:
     """
     if sampler["method"] == "nuts":
         return f"NUTS, {sampler['ensembles']} chains of {sampler['steps']} draws after {sampler['warm_up']} of warm-up"
+    if sampler["method"] == "importance":
+        batches = f"{sampler['ensembles']} batches of {sampler['steps']} draws"
+        return f"importance sampling, {batches}, Pareto k {sampler['pareto_k']:.2f}"
     return f"{sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps"
 
 

@@ -132,6 +132,8 @@ def _sampler_page(fit: Record, posterior: Draws) -> dict[str, Any]:
     }
     if posterior.trajectories is not None:
         page |= {k: v for k, v in values_by_key(posterior.trajectories).items() if k != "statistics"}
+    if posterior.pareto_k is not None:
+        page["pareto_k"] = posterior.pareto_k
     return page
 
 

@@ -78,6 +78,10 @@ _NOT_YET_CONVERGED = (
     "The numbers still change as sampling goes on, and may be far off. Continue with the same command and --resume; if that "
     "does not help, state what you know about the coefficients in cable.toml."
 )
+_WEIGHTS_UNEVEN = (
+    "The weighted draws do not suffice, and the numbers may be far off. Fit again with --sampler emcee, whose walkers need no "
+    "weights."
+)
 _NO_MINIMUM = (
     "Least squares found no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc: "
     "sampling needs no minimum."
@@ -98,6 +102,7 @@ class Verdict(Display):
         usable: Which answers rest on the readings, and which on priors of coefficients.
         coefficients_to_leave: Sentence on the coefficients that must not be used by themselves, where the design answer holds
             all the same; empty where there are none.
+        weighted: Whether the draws are those of importance sampling.
     """
 
     troubles: dict[str, tuple[str, ...]]
@@ -105,6 +110,7 @@ class Verdict(Display):
     doubts: tuple[str, ...] = ()
     usable: UsableAnswers = field(default_factory=lambda: UsableAnswers(None, None, ()))
     coefficients_to_leave: str = ""
+    weighted: bool = False
 
     @property
     def trusted(self) -> bool:
@@ -161,7 +167,8 @@ def assess_fit(fit: Record) -> Verdict:
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
     to_leave = describe_coefficients_to_leave(fit) if usable.holds else ""
-    return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit), usable, to_leave)
+    weighted = fit.sampled is not None and fit.sampled.sampler == "importance"
+    return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit), usable, to_leave, weighted)
 
 
 def assess_for(fit: Record, purpose: Purpose) -> Verdict:
@@ -219,7 +226,8 @@ def reasons_against(fit_verdict: Verdict) -> list[str]:
     """Return the reasons not to trust a fit, without what only says how the computation went."""
     sentences = [sentence for kind in _PROBLEMS if kind != NOT_CONVERGED for sentence in fit_verdict.troubles.get(kind, ())]
     if NOT_CONVERGED in fit_verdict.troubles:
-        sentences.append(_NOT_YET_CONVERGED if fit_verdict.sampled else _NO_MINIMUM)
+        of_draws = _WEIGHTS_UNEVEN if fit_verdict.weighted else _NOT_YET_CONVERGED
+        sentences.append(of_draws if fit_verdict.sampled else _NO_MINIMUM)
     return sentences
 
 

@@ -257,7 +257,7 @@ def test_completion_is_printed_for(run, shell):
     [
         (["ide"], {"identify"}),
         (["fit", "--sam"], {"--sampler"}),
-        (["fit", "--sampler", ""], {"emcee", "nuts", "both"}),
+        (["fit", "--sampler", ""], {"emcee", "nuts", "importance", "both"}),
         (["init", "--example", "on-body"], {"on-body-exoskeleton", "on-body-metabolic"}),
         (["check", "READ"], {"README.md"}),
     ],

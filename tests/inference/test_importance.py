@@ -84,7 +84,7 @@ def test_loop_gets_the_answer_of_walkers(tmp_path):
         bf.fit("datasets/synthetic-haptic-loop", seed=1, sampler=sampler, output=tmp_path / sampler, figures=False)
         for sampler in ("importance", "emcee")
     ]
-    assert all(fit.verdict.trusted for fit in fits)
+    assert all(fit.verdict().trusted for fit in fits)
     assert fits[0].posterior.sampler == "importance"
     for name in ("mu", "tau", "sigma_block"):
         by_weights, by_walkers = (fit.posterior.values[name].ravel() for fit in fits)

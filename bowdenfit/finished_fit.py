@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from bowdenfit.arguments import Quantity, number_with_unit
-from bowdenfit.display import Rows, text_of
+from bowdenfit.display import Block, Rows, blocks_of
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
-from bowdenfit.questions.bends.words import bends_text
+from bowdenfit.questions.bends.words import elastic_blocks
 from bowdenfit.questions.check.answer import Checks, check_readings
-from bowdenfit.questions.check.words import describe_checks_alone
+from bowdenfit.questions.check.words import check_sentences
+from bowdenfit.questions.compare.answer import Comparison
+from bowdenfit.questions.compare.words import comparison_blocks
 from bowdenfit.questions.error_budget import ErrorBudget, error_budget
 from bowdenfit.questions.figures import (
     FIGURES,
@@ -24,13 +26,13 @@ from bowdenfit.questions.figures import (
     warning_mark,
 )
 from bowdenfit.questions.groups import Groups, contrast_groups
-from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
+from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import assess_identifiability
-from bowdenfit.questions.predict.predictions import predictions_text
-from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.predict.predictions import prediction_blocks
+from bowdenfit.questions.summary.brief import summary_blocks
 from bowdenfit.questions.summary.details import posterior_intervals
 from bowdenfit.questions.summary.page import Summary, summarize
-from bowdenfit.questions.summary.verdict import Verdict, assess_fit, verdict_text
+from bowdenfit.questions.summary.verdict import Verdict, assess_fit
 from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES
 from bowdenfit.results.record import Record
@@ -120,7 +122,7 @@ class Fit(Record):
 
     def summary(self) -> Summary:
         """Return everything on one page, for programs (the contents of summary.json)."""
-        return Summary(summarize(self), self.__str__)
+        return Summary(summarize(self), partial(blocks_of, self))
 
     def verdict(self) -> Verdict:
         """Return whether the answers may be trusted, and if not, why."""
@@ -259,13 +261,12 @@ def collect_answers(fit: Record) -> dict[str, Any]:
     return answers
 
 
-_WORDS: dict[type, Callable[..., str]] = {
-    Record: summary_text,
-    Verdict: verdict_text,
-    Checks: describe_checks_alone,
-    ElasticAnswers: bends_text,
-    Identifiability: identifiability_text,
-    Efficiencies: lambda efficiencies: predictions_text(efficiencies.rows),
+_BLOCKS: dict[type, Callable[..., Sequence[Block]]] = {
+    Record: summary_blocks,
+    Checks: check_sentences,
+    ElasticAnswers: elastic_blocks,
+    Efficiencies: lambda efficiencies: prediction_blocks(efficiencies.rows),
+    Comparison: comparison_blocks,
 }
-for _result, _words in _WORDS.items():
-    text_of.register(_result)(_words)
+for _result, _blocks in _BLOCKS.items():
+    blocks_of.register(_result)(_blocks)

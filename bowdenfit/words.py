@@ -3,7 +3,7 @@
 import math
 import re
 import textwrap
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import zip_longest
 
 _LARGE = 1e7  # from which on powers of ten are easier to read than zeros
@@ -119,15 +119,6 @@ def filled(text: str, indent: str = "", hangs: bool = False) -> str:
 def kept_narrow(line: str, indent: str = "") -> str:
     """Return a line unchanged if it fits into a terminal, else filled; so that a row of a table stays one line."""
     return (indent + line).rstrip() if len(line) <= WIDTH else filled(line, indent, hangs=True)
-
-
-def legend(meanings: Mapping[str, str]) -> str:
-    """Return a line for each name and its meaning; empty if there are no meanings.
-
-    Args:
-        meanings: In words, by name.
-    """
-    return "\n".join(filled(f"{name}: {words}", hangs=True) for name, words in meanings.items() if words)
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:

@@ -27,7 +27,6 @@ sys.path.insert(0, str(ROOT / "tests" / "support"))
 from hand_bench import Readings, pull, write  # noqa: E402
 
 import bowdenfit as bf  # noqa: E402
-from bowdenfit.questions.next import next_measurement_text  # noqa: E402
 
 LEAST, MOST = 0.80, 0.97  # share of the outcomes inside the range
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
@@ -94,7 +93,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as scratch:
             for seed in range(1, options.seeds + 1):
                 once = bf.next_measurement(bf.fit(write(Path(scratch) / "once", first), seed=seed))
-                texts.append(" ".join(next_measurement_text(once).split()))
+                texts.append(" ".join(str(once).split()))
                 second = bench.measure(np.random.default_rng([options.seed, number, seed]), "2")
                 twice = bf.fit(write(Path(scratch) / "twice", join(first, second)), seed=seed)
                 interval, stated_value = twice.parameter("mu"), once.second_mounting

@@ -71,12 +71,11 @@ def draw_small(source: Path, target: Path) -> None:
 def compare(place: Path) -> None:
     """Whether friction of the recordings depends on the speed."""
     import bowdenfit as bf
-    from bowdenfit.questions.compare.words import comparison_text
 
     name = "synthetic-recordings"
     rate = bf.fit(ROOT / "datasets" / name, friction="rate-dependent", seed=1)
     comparison = bf.compare({"plain": bf.load(place / name), "rate": rate})
-    (PUBLISHED / name / "comparison.txt").write_text(comparison_text(comparison), encoding="utf-8")
+    (PUBLISHED / name / "comparison.txt").write_text(f"{comparison}\n", encoding="utf-8")
 
 
 def write_quoted_numbers(fits: Path, place: Path) -> None:

@@ -124,11 +124,6 @@ class Description(Display, Frozen):
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
-    def model_post_init(self, context: Any) -> None:
-        """Make tuples and dictionaries in it display themselves."""
-        del context
-        Display.__post_init__(self)
-
     @field_validator("friction_model")
     @classmethod
     def _hyphens(cls, model: str) -> str:

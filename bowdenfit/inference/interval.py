@@ -34,6 +34,10 @@ class Interval(Display):
     def __str__(self) -> str:
         return f"{self.median:z.{self.digits}f} (90 % interval {self.range_text(self.digits)})"
 
+    def sentences(self) -> list[str]:
+        """Return the median with the interval."""
+        return [str(self)]
+
     def range_text(self, digits: int) -> str:
         """Return its ends to so many decimals, such as '0.166 to 0.186'."""
         return f"{self.q05:z.{digits}f} to {self.q95:z.{digits}f}"

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import Description
-from bowdenfit.display import Part
 from bowdenfit.kinds import find_kind
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.sliding_rows import STROKE as STROKE
@@ -19,8 +18,8 @@ RUN = "Run"
 _ONE_PLACE = 0.02  # range within a run over that of all readings, up to which the run has one value; a judgement
 
 
-@dataclass(frozen=True, repr=False)
-class Covariates(Part):
+@dataclass(frozen=True)
+class Covariates:
     """Covariates of the readings of one table: what residuals are plotted and tested against.
 
     Args:

@@ -11,7 +11,6 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 
 from bowdenfit.description import Description, Route
-from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require_column
@@ -45,8 +44,8 @@ class UnusedColumn:
     levels: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, repr=False)
-class RowOrigin(Part):
+@dataclass(frozen=True)
+class RowOrigin:
     """File and line of each row of a table, so that any row can be named.
 
     Args:
@@ -69,8 +68,8 @@ class RowOrigin(Part):
         return f"{self.files[self.file[i]]}, row {self.row[i]}"
 
 
-@dataclass(frozen=True, repr=False)
-class OwnAngles(Part):
+@dataclass(frozen=True)
+class OwnAngles:
     """Wrap angles measured row by row: NaN where a row has none and the curve must serve.
 
     Args:

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from bowdenfit.description import QuantityValue, Table
-from bowdenfit.display import Display, Part
+from bowdenfit.display import Display
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
@@ -50,8 +50,8 @@ class AngleSettings(Table):
     undetected: Literal["censored", "zero", "dropped"] = "censored"
 
 
-@dataclass(frozen=True, repr=False)
-class AngleTable(Part):
+@dataclass(frozen=True)
+class AngleTable:
     """Wrap angle of each curved contact against the route variable.
 
     Args:
@@ -74,8 +74,8 @@ class AngleTable(Part):
         return self.angle[:, k], self.limit[:, k]
 
 
-@dataclass(frozen=True, repr=False)
-class StretchTable(Part):
+@dataclass(frozen=True)
+class StretchTable:
     """Stretch of the rope, seen at its loaded end while the far end is held, under loads and at wrap angles.
 
     Args:
@@ -108,8 +108,8 @@ class PreloadTableSettings(Table):
         return True
 
 
-@dataclass(frozen=True, repr=False)
-class PreloadTable(Part):
+@dataclass(frozen=True)
+class PreloadTable:
     """Preload between fixed ends at wrap angles.
 
     Args:
@@ -123,8 +123,8 @@ class PreloadTable(Part):
     origin: RowOrigin
 
 
-@dataclass(frozen=True, repr=False)
-class LoopTable(Part):
+@dataclass(frozen=True)
+class LoopTable:
     """Forces at both ends of a pull-pull loop while it moves.
 
     Args:

@@ -51,6 +51,10 @@ class Contrast(Display):
     def __str__(self) -> str:
         return self.sentence()
 
+    def sentences(self) -> list[str]:
+        """Return the contrast in words."""
+        return [self.sentence()]
+
     def _table(self) -> Rows:
         return [self.row], dict.fromkeys(self.row, "1")
 

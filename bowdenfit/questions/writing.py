@@ -12,6 +12,7 @@ from bowdenfit.outputs import write_text
 from bowdenfit.plots.write import FORMATS
 from bowdenfit.results.answer_cache import copy_captions
 from bowdenfit.results.folder import fill_folder_atomically, is_empty, kept_file
+from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.pages.section import HtmlPage
@@ -25,6 +26,10 @@ class Files(Display, list[Path]):
 
     def __str__(self) -> str:
         return "\n".join(map(str, self))
+
+    def sentences(self) -> list[str]:
+        """Return how many there are."""
+        return [f"Wrote {counted(len(self), 'file')}."]
 
     def _table(self) -> Rows:
         return [{"file": str(path)} for path in self], {}

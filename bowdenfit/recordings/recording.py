@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from bowdenfit.display import Part
 from bowdenfit.types import Flags, Labels, Vector
 
 PULL, RETURN, SWITCH = 1, -1, 0
@@ -62,8 +61,8 @@ class FlaggedSamples:
     output_force: Vector
 
 
-@dataclass(frozen=True, repr=False)
-class Account(Part):
+@dataclass(frozen=True)
+class Account:
     """What the preparation did, and where every sample went.
 
     Args:
@@ -100,8 +99,8 @@ class Account(Part):
     clock_shift: float | None = None
 
 
-@dataclass(frozen=True, repr=False)
-class Blocks(Part):
+@dataclass(frozen=True)
+class Blocks:
     """A prepared recording: means over short blocks on one clock.
 
     Args:
@@ -124,8 +123,8 @@ class Blocks(Part):
     input_turn: Vector | None = None
 
 
-@dataclass(frozen=True, repr=False)
-class Strokes(Part):
+@dataclass(frozen=True)
+class Strokes:
     """What the cable did in each block, and what that says about it before any model of the whole cable.
 
     Args:
@@ -157,8 +156,8 @@ class Strokes(Part):
     remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True, repr=False)
-class Recording(Part):
+@dataclass(frozen=True)
+class Recording:
     """One recording, ready for a fit.
 
     Args:
@@ -184,8 +183,8 @@ class Recording(Part):
     account: Account
 
 
-@dataclass(frozen=True, repr=False)
-class Recordings(Part):
+@dataclass(frozen=True)
+class Recordings:
     """All recordings of a data set.
 
     Args:

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import capitalized, decimals, filled, percent, significant, table
+from bowdenfit.words import capitalized, decimals, percent, significant
 
 EDGE_FRACTION = 0.001  # an optimum this close to an end of the range, as a fraction of the range, is at the edge; a judgement
 
@@ -152,9 +152,6 @@ class OptimalLength(Display):
             return f"measure more{' before you cut' if is_cut else ''}; the best guess is {value} {self.unit}"
         return f"{'cut the cable to' if is_cut else f'the best {self.what} is'} {value} {self.unit}"
 
-    def __str__(self) -> str:
-        return "\n".join([self.headline, *(filled(sentence) for sentence in self.sentences()), *self._of_choices()])
-
     def _table(self) -> Rows:
         if not self.choices:
             quantities = {self.variable: self.length, "efficiency": self.efficiency}
@@ -212,9 +209,6 @@ class OptimalLength(Display):
             f"{percent(window.probability, 0)} probability; more measurements are needed."
         )
 
-    def _of_choices(self) -> list[str]:
-        return ["", table(self.heads, self.rows)] if self.choices else []
-
     @property
     def heads(self) -> tuple[str, str, str]:
         """Headings of the table of choices."""
@@ -226,3 +220,9 @@ class OptimalLength(Display):
         return [
             (f"{c.length:g}", percent(c.probability_best), f"{100 * c.expected_regret:.2f} points") for c in self.choices
         ]
+
+
+@blocks_of.register
+def _(best: OptimalLength) -> list[Block]:
+    """Return what to do, how certain that is, and the choices in a table."""
+    return separate([best.headline, *best.sentences()], [ResultTable(best.heads, best.rows)] if best.choices else [])

@@ -20,7 +20,6 @@ from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.physics.geometry import logistic_wrap_angle
 from bowdenfit.questions.check.verb import check
-from bowdenfit.questions.compare.words import comparison_text
 from bowdenfit.questions.length.wrap_angles_figure import data, draw
 from bowdenfit.questions.summary.details import details_text
 
@@ -241,7 +240,7 @@ def test_comparing_the_families_finds_the_shape_of_the_route(fits):
     assert comparison.verdict("smooth") != "clear", "it follows a bell as well"
     assert len(comparison.readings) == len(LENGTHS) + 9
     assert [comparison.descriptions[name].rpartition(", ")[2] for name in CURVES] == [f"{name} curves" for name in CURVES]
-    assert "The data prefer gaussian over" in comparison_text(comparison)
+    assert "The data prefer gaussian over" in str(comparison)
 
 
 @pytest.mark.extended

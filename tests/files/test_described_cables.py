@@ -26,10 +26,15 @@ def table(name):
     return pd.read_csv(ON_BODY / f"{name}.csv", comment="#")
 
 
+def arrays_of(readings):
+    """The arrays of a table, by name."""
+    return {name: value for name, value in vars(readings).items() if isinstance(value, np.ndarray)}
+
+
 def test_readings_are_those_of_a_folder():
     data, same = on_body().read(angles=table("angles"), efficiencies=table("efficiencies")), bf.read(ON_BODY)
     for first, other in zip(data.measurements.tables, same.measurements.tables, strict=True):
-        pd.testing.assert_frame_equal(first.to_frame(), other.to_frame())
+        np.testing.assert_equal(arrays_of(first), arrays_of(other))
     assert data.description.contact == same.description.contact
 
 

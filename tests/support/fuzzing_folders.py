@@ -14,7 +14,6 @@ import bowdenfit as bf
 from bowdenfit.addons.device.description import read_device
 from bowdenfit.addons.device.description_keys import KEYS
 from bowdenfit.addons.fleet.inspections import read_cases, read_inspections, refuse_if_none_usable
-from bowdenfit.addons.metabolic.answer import metabolic_text
 from bowdenfit.results.serialization import plain_data
 
 INSPECTIONS = 3  # of the fleet that is mangled
@@ -88,7 +87,7 @@ def study_of_persons(place: Path) -> Path:
 def meet_study(folder: Path) -> None:
     """All forms of its answer."""
     study = bf.metabolic(folder)
-    assert metabolic_text(study) and study.to_csv()
+    assert str(study) and study.to_csv()
     json.dumps(plain_data(study), allow_nan=False)
 
 

@@ -15,7 +15,7 @@ from bowdenfit.addons.app.add_rows import show_table_links
 from bowdenfit.addons.app.elements import VALUE_AT_FIRST, address, block, button, choice, field, link, markup, text
 from bowdenfit.addons.app.frame import refused, section
 from bowdenfit.addons.app.workbench import Workbench
-from bowdenfit.display import as_html
+from bowdenfit.display import blocks_of, render_html
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
 from bowdenfit.questions import export as export_room
@@ -97,9 +97,9 @@ class ArrivingForce:
                 answered = self._asked
                 question = partial(self._dials.answer_dials, self._fit, dict(self._values), self._way == "in", self._stroke)
                 try:
-                    words = as_html(await self._workbench.compute(question))
+                    words = render_html(blocks_of(await self._workbench.compute(question)))
                 except BowdenfitError as error:
-                    words = as_html(str(error))
+                    words = render_html([str(error)])
                 self._place.set_content(words)
                 await asyncio.sleep(0)
         finally:

@@ -11,6 +11,7 @@ from bowdenfit.arguments import Stroke
 from bowdenfit.description import Contact
 from bowdenfit.finished_fit import Fit
 from bowdenfit.questions.predict.measured_range import find_measured_range
+from bowdenfit.questions.predict.predictions import Predictions
 from bowdenfit.questions.predict.verb import predict
 from bowdenfit.units import conversion_factor
 
@@ -58,7 +59,7 @@ def list_dials(fit: Fit) -> tuple[Dial, ...]:
     return (*places, _dial(FORCE, "Force", "N", 0.0, most, most / _BEYOND / 2))
 
 
-def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: Stroke) -> str:
+def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: Stroke) -> Predictions:
     """Return what `bowdenfit predict` says where the dials stand.
 
     Args:
@@ -76,7 +77,7 @@ def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: 
         request |= {"wrap_angles": [f"{places['']:g}deg"]}
     else:
         request |= {"wrap_angles": {name: f"{angle:g}deg" for name, angle in places.items()}}
-    return str(predict(fit, stroke=stroke, **request))
+    return predict(fit, stroke=stroke, **request)
 
 
 def _dial(key: str, label: str, unit: str, low: float, high: float, value: float) -> Dial:

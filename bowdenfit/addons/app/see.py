@@ -12,7 +12,7 @@ from bowdenfit.addons.app.elements import address, block, button, choice, field,
 from bowdenfit.addons.app.fit_job import FitJob
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.workbench import Workbench
-from bowdenfit.display import as_html
+from bowdenfit.display import Preformatted
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
 from bowdenfit.questions import next as next_room
@@ -76,7 +76,7 @@ class FitPage:
         """Show the answer of a fit whose figures are still drawn."""
         printed = await self._workbench.compute(_read_summary, self._workbench.results(self._name))
         with section("The answer", "answer"):
-            markup(as_html(printed.text), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
+            _show_text(printed)
 
     def _show_job(self, job: FitJob) -> None:
         """Show a fit that runs, or why it ended without an answer."""
@@ -133,7 +133,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         printed = await workbench.compute(_read_summary, folder)
         with block("div", "columns-of-page"):
             with block("div") as left, section("The answer", "answer"):
-                answer = markup(as_html(printed.text), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
+                answer = _show_text(printed)
                 loading = text("Loading the fit, for what can be asked of it ...", classes="hint", role="status")
                 with block("details"):
                     text("As the command line prints it", "summary")
@@ -170,6 +170,11 @@ def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str)
     elsewhere = {report_room.FIGURES_TITLE, next_room.TITLE}  # which have their own places on this page
     shown = [(title, sections[title]) for title in others if title not in elsewhere]
     return [sections[first], *shown, sections.get(report_room.FIGURES_TITLE, "")]
+
+
+def _show_text(printed: Reply) -> Any:
+    """Show a summary as it was written, and return where it is."""
+    return markup(Preformatted(printed.text).to_html(), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
 
 
 def _kind_of(printed: Reply) -> str:

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Rows, text_of
+from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import counted, decimals, filled, give_or_take, listed, table
+from bowdenfit.words import counted, decimals, give_or_take, listed
 
 _NAMED = 12  # broken or untrusted inspections that are named; a judgement
 _ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "NUTS"}
@@ -129,16 +129,16 @@ class Fleet(Display):
         return rows, dict(self.units)
 
 
-@text_of.register(Fleet)
-def fleet_text(fleet: Fleet) -> str:
+@blocks_of.register
+def _(fleet: Fleet) -> list[Block]:
     """Return a fleet for people: whether all went well, the range of each quantity, and what is broken."""
-    blocks = [
-        filled(status_sentence(fleet)),
-        "\n".join([*_list_inspections("broken", [(b.inspection, b.why) for b in fleet.broken]), *_list_untrusted(fleet)]),
-        f"{table(_HEADS, _quantity_rows(fleet))}\n\n{filled(_explain_columns(fleet))}" if fleet.fitted else "",
-        "\n".join(filled(line) for line in _method_sentences(fleet)),
-    ]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return separate(
+        [status_sentence(fleet)],
+        [*_list_inspections("broken", [(b.inspection, b.why) for b in fleet.broken]), *_list_untrusted(fleet)],
+        [ResultTable(_HEADS, _quantity_rows(fleet))] if fleet.fitted else [],
+        [_explain_columns(fleet)] if fleet.fitted else [],
+        _method_sentences(fleet),
+    )
 
 
 def status_sentence(fleet: Fleet) -> str:
@@ -154,7 +154,7 @@ def status_sentence(fleet: Fleet) -> str:
 
 def _list_inspections(what: str, named: list[tuple[str, str]]) -> list[str]:
     """List inspections with what is wrong, and how many more."""
-    lines = [filled(f"- {label}: {' '.join(why.split())}", hangs=True) for label, why in named[:_NAMED]]
+    lines = [f"- {label}: {' '.join(why.split())}" for label, why in named[:_NAMED]]
     more = len(named) - _NAMED
     return [*lines, f"- and {more} more {what} ones, in fleet.json."] if more > 0 else lines
 

@@ -13,7 +13,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from bowdenfit.addons.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
+from bowdenfit.addons.fleet.answer import FailedInspection, FittedInspection, Fleet
 from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
 from bowdenfit.addons.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable
 from bowdenfit.addons.fleet.pieces import Example, Piece, PieceFit, fit_piece
@@ -295,7 +295,7 @@ def _write_results(answer: Fleet, draws: FleetDraws | None, store: FleetStore) -
     with fill_folder_atomically(store.folder, FLEET_PAGE) as folder:
         if draws is not None:
             write_fleet_draws(folder / FLEET_DRAWS, draws)
-        write_text(folder / SUMMARY_TEXT, printable(fleet_text(answer)))
+        write_text(folder / SUMMARY_TEXT, printable(f"{answer}\n"))
         page = plain_data(answer) | {CHECKSUM: file_checksum(folder / FLEET_DRAWS)}
         write_text(folder / FLEET_PAGE, json.dumps(page, indent=1) + "\n")
     store.finish()

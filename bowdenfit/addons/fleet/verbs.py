@@ -67,7 +67,7 @@ def fleet(
 
 def _reply(answer: "Fleet", options: dict[str, Any]) -> Reply:
     exit_code = 0 if answer.is_trusted else NOT_TRUSTED
-    return Reply(_fleet.fleet_text(answer), lambda: answer, (f"Wrote {options['output']}.",), exit_code, answer.to_csv)
+    return Reply(f"{answer}\n", lambda: answer, (f"Wrote {options['output']}.",), exit_code, answer.to_csv)
 
 
 def _show(bar: Any, done: int, total: int, seconds: float) -> None:

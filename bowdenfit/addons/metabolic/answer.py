@@ -22,18 +22,18 @@ from bowdenfit.addons.metabolic.study import (
     t_from_p,
     two_sided_p,
 )
-from bowdenfit.display import Display, Part, Rows, text_of
+from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
 from bowdenfit.errors import DatasetError
 from bowdenfit.multiple_testing import adjust_p_values
-from bowdenfit.words import counted, filled, narrow_table, percent
+from bowdenfit.words import counted, percent
 
 EXPECTED = 0.03  # of the cost: standard deviation of differences that one who doubts expects; a judgement
 _ROUNDING_SLACK = 0.02  # of correlations and their eigenvalues, for what rounding of printed numbers may do; a judgement
 Range = tuple[float, float]
 
 
-@dataclass(frozen=True, repr=False)
-class ConditionDifference(Part):
+@dataclass(frozen=True)
+class ConditionDifference:
     """A condition less another, of the same persons.
 
     Args:
@@ -242,8 +242,8 @@ def _format_range(span: Range) -> str:
     return f"{span[0]:.2f} to {span[1]:.2f}"
 
 
-@text_of.register(Metabolic)
-def metabolic_text(result: Metabolic) -> str:
+@blocks_of.register
+def _(result: Metabolic) -> list[Block]:
     """Return a study for people: what it shows, what it does not, and what of it cannot be right."""
     heads = ("condition", "minus", "W/kg", "95 % from", "to", "change", "p", "p (Holm)", "lower with prob.")
     rows = [
@@ -251,15 +251,13 @@ def metabolic_text(result: Metabolic) -> str:
          f"{c.p:.2g}", f"{c.p_holm:.2g}", f"{c.lower_doubted:.2f} to {c.lower:.2f}")
         for c in result.comparisons
     ]  # fmt: skip
-    blocks = [
-        "\n".join(filled(line) for line in (f"{result.name}:", *map(_difference_sentence, result.comparisons))),
-        narrow_table(heads, rows, left=("minus",)),
-        "\n".join(filled(f"- {line}") for line in result.contradictions),
-        "\n".join(filled(line) for line in _remark_sentences(result)),
-    ]
-    if result.contradictions:
-        blocks[2] = f"Numbers that cannot all be right\n{blocks[2]}"
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    contradictions = [f"- {sentence}" for sentence in result.contradictions]
+    return separate(
+        (f"{result.name}:", *map(_difference_sentence, result.comparisons)),
+        [ResultTable(heads, rows, left=("minus",), narrow=True)],
+        ["Numbers that cannot all be right", *contradictions] if contradictions else [],
+        _remark_sentences(result),
+    )
 
 
 def _difference_sentence(comparison: ConditionDifference) -> str:

@@ -31,7 +31,7 @@ def metabolic(
 
 
 def _reply(result: "Metabolic", _: dict[str, Any]) -> Reply:
-    return Reply(room.metabolic_text(result), lambda: result, csv=result.to_csv)
+    return Reply(f"{result}\n", lambda: result, csv=result.to_csv)
 
 
 METABOLIC = Verb(

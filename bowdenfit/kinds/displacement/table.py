@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from bowdenfit.description import QuantityValue, Table
-from bowdenfit.display import Part
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -36,8 +35,8 @@ class Turns:
     depth: Labels
 
 
-@dataclass(frozen=True, repr=False)
-class StrokeHistory(Part):
+@dataclass(frozen=True)
+class StrokeHistory:
     """Stroke of each reading, and the turn of the motor that it comes after.
 
     Args:
@@ -153,8 +152,8 @@ class DisplacementSettings(Table):
     rows: Literal["in order", "sliding"] | None = None
 
 
-@dataclass(frozen=True, repr=False)
-class DisplacementTable(Part):
+@dataclass(frozen=True)
+class DisplacementTable:
     """Force at the motor against displacement.
 
     Args:

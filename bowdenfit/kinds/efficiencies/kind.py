@@ -7,7 +7,6 @@ import numpy as np
 from typing_extensions import override
 
 from bowdenfit.description import Description, Finite
-from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import (
     Column,
@@ -51,8 +50,8 @@ _FRACTION = 0.01  # efficiency up to which a percentage is as likely a fraction;
 _SDS = 4.5  # stated standard deviations above 1: one healthy row of 300,000 exceeds it
 
 
-@dataclass(frozen=True, repr=False)
-class EfficiencyTable(Part):
+@dataclass(frozen=True)
+class EfficiencyTable:
     """Measured transmission efficiencies.
 
     Args:

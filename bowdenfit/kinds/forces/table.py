@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.description import Description
-from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import (
@@ -60,8 +59,8 @@ _FEWEST_ALIKE = 4  # loads beyond the first of each run and stroke, from which t
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 
-@dataclass(frozen=True, repr=False)
-class ForceTable(Part):
+@dataclass(frozen=True)
+class ForceTable:
     """Pairs of forces read at both ends.
 
     Args:

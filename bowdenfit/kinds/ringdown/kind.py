@@ -11,7 +11,6 @@ from typing_extensions import override
 from bowdenfit.description import Description, Table
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import QuantityValue
-from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, require_column
 from bowdenfit.files.tables import RawTable
@@ -35,8 +34,8 @@ class RingDownSettings(Table):
     inertia: QuantityValue | None = None
 
 
-@dataclass(frozen=True, repr=False)
-class RingDownTable(Part):
+@dataclass(frozen=True)
+class RingDownTable:
     """Ring-downs of a bar that swings against the rope, the motor held.
 
     Args:

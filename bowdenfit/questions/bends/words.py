@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bowdenfit.description.stated_parameters import PRELOAD
+from bowdenfit.display import Block, ResultTable
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
@@ -13,7 +14,7 @@ from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers, fr
 from bowdenfit.questions.bends.bent_cable import find_bent_contact
 from bowdenfit.questions.bends.preload_window import PreloadWindow
 from bowdenfit.results.record import Record, cached_per_fit
-from bowdenfit.words import filled, significant, table
+from bowdenfit.words import significant
 
 Cells = tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]
 TABLE_HEADING = "Stretch and preload, median (90 % interval)"
@@ -105,25 +106,25 @@ def describe_products_with_preload(fit: Record) -> list[str]:
     return sentences
 
 
-def bends_text(answers: ElasticAnswers) -> str:
+def elastic_blocks(answers: ElasticAnswers) -> list[Block]:
     """Describe the answers, or what is missing for them.
 
     Args:
         answers: The answers of a fit.
     """
-    return describe_elastic(answers.fit) or filled(
+    return describe_elastic(answers.fit) or [
         "Nothing measured on this cable determines its stretch or preload, or the fit has no draws; name a table of "
         "stretch, of preload or of the loop in cable.toml."
-    )
+    ]
 
 
-def describe_elastic(fit: Record) -> str:
-    """Describe the answers about stretch, preload and the loop, with their intervals."""
+def describe_elastic(fit: Record) -> list[Block]:
+    """Describe the answers about stretch, preload and the loop, with their intervals; empty where there are none."""
     overview = elastic_overview(fit)
     if overview is None:
-        return ""
-    tables = [table(heads, rows) for heads, rows in elastic_tables(overview)]
-    return "\n".join([*([TABLE_HEADING] if tables else []), *tables, *(filled(s) for s in overview.sentences)])
+        return []
+    tables = [ResultTable(*cells) for cells in elastic_tables(overview)]
+    return [*([TABLE_HEADING] if tables else []), *tables, *overview.sentences]
 
 
 def elastic_tables(overview: ElasticOverview) -> list[Cells]:

@@ -5,4 +5,3 @@ from .calibration import write_calibration as write_calibration
 from .plan import list_quantities as list_quantities
 from .plan import make_plan as make_plan
 from .replications import read_seed as read_seed
-from .words import calibration_text as calibration_text

@@ -19,7 +19,7 @@ from bowdenfit.questions.calibrate.plan import CalibrationPlan
 from bowdenfit.questions.calibrate.rank_tests import summarize_replications
 from bowdenfit.questions.calibrate.replications import CALIBRATION, Replication, append_replication, open_replications
 from bowdenfit.questions.calibrate.replicator import BATCH_SIZE, RANK_SETTINGS, BatchFitter, Replicator
-from bowdenfit.questions.calibrate.words import calibration_page, calibration_text, details_text, draw_calibration
+from bowdenfit.questions.calibrate.words import calibration_page, details_text, draw_calibration
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, reserve_folder
 from bowdenfit.results.serialization import plain_data
@@ -131,7 +131,7 @@ def write_calibration(calibration: Calibration, folder: Path) -> None:
     """
     with folder_to_write(folder):
         (folder / CALIBRATION).unlink(missing_ok=True)  # of fewer replications
-        write_text(folder / SUMMARY_TEXT, calibration_text(calibration))
+        write_text(folder / SUMMARY_TEXT, f"{calibration}\n")
         write_text(folder / DETAILS_TEXT, details_text(calibration))
         draw_calibration(calibration, folder / FIGURES)
         write_page(calibration_page(calibration), folder / FIGURES, folder / REPORT)

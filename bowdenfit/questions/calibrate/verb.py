@@ -105,7 +105,7 @@ def _read_stated_and_assumed(
 def _reply(calibration: "Calibration", options: dict[str, Any]) -> Reply:
     exit_code = 0 if calibration.is_calibrated else NOT_CALIBRATED
     return Reply(
-        room.calibration_text(calibration),
+        f"{calibration}\n",
         lambda: calibration,
         (f"Wrote {options['output']}.",),
         exit_code,

@@ -3,12 +3,12 @@
 import math
 from pathlib import Path
 
-from bowdenfit.display import text_of
+from bowdenfit.display import Block, Legend, ResultTable, blocks_of, render_text, separate
 from bowdenfit.pages.section import HtmlPage, PageTable, Picture, make_meanings_table, prose_section
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
 from bowdenfit.questions.calibrate.answer import LEVEL, MAX_UNCONVERGED, MIN_REPLICATIONS, Calibration, CheckedQuantity
 from bowdenfit.questions.figure_files import AnswerFigure, write_figure
-from bowdenfit.words import counted, filled, legend, listed, percent, significant, table
+from bowdenfit.words import counted, listed, percent, significant
 
 HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
 EVIDENCE_HEADS = ("quantity", "p of ranks", "corrected", "shrinkage")
@@ -16,27 +16,26 @@ FOLDED = ("ranks", "sharpness")  # figures for statisticians
 _MAX_NAMED = 8  # unconverged replications that are named; a judgement
 
 
-@text_of.register(Calibration)
-def calibration_text(calibration: Calibration) -> str:
+@blocks_of.register(Calibration)
+def calibration_blocks(calibration: Calibration) -> list[Block]:
     """Return a calibration for people: the verdict, a table of all quantities, and what was left out."""
-    blocks = [
-        "\n".join(filled(line) for line in verdict_sentences(calibration)),
-        filled(describe_procedure(calibration)),
-        f"{table(HEADS, quantity_rows(calibration))}\n\n{filled(quantity_note(calibration))}"
-        if calibration.quantities
-        else "",
-        legend({q.name: q.meaning for q in calibration.quantities}),
-        "\n".join(filled(line) for line in omission_sentences(calibration)),
-    ]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    quantities = calibration.quantities
+    return separate(
+        verdict_sentences(calibration),
+        [describe_procedure(calibration)],
+        [ResultTable(HEADS, quantity_rows(calibration))] if quantities else [],
+        [quantity_note(calibration)] if quantities else [],
+        [Legend({q.name: q.meaning for q in quantities})],
+        omission_sentences(calibration),
+    )
 
 
 def details_text(calibration: Calibration) -> str:
     """Return all of a calibration (`details.txt`): what is printed, then what the verdict on each quantity rests on."""
-    if not calibration.quantities:
-        return calibration_text(calibration)
-    evidence = f"{table(EVIDENCE_HEADS, evidence_rows(calibration))}\n\n{filled(evidence_note(calibration))}"
-    return f"{calibration_text(calibration)}\n{evidence}\n"
+    blocks = calibration_blocks(calibration)
+    if calibration.quantities:
+        blocks += ["", ResultTable(EVIDENCE_HEADS, evidence_rows(calibration)), "", evidence_note(calibration)]
+    return render_text(blocks)
 
 
 def calibration_page(calibration: Calibration) -> HtmlPage:

@@ -13,7 +13,7 @@ from typing import ClassVar
 import jax
 import numpy as np
 
-from bowdenfit.display import Display, Rows, Several
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.draws import DrawFunction, compile_replicator
 from bowdenfit.inference.leave_one_out import LooDensity, LooRefits
 from bowdenfit.inference.log_density import LogDensity
@@ -69,25 +69,25 @@ class Checks(Display):
         return rows, {reading.label: reading.unit for reading in self.readings}
 
     @cached_property
-    def readings(self) -> Several[CheckedReading]:
+    def readings(self) -> tuple[CheckedReading, ...]:
         """Every reading of every table."""
         n_readings = sum(len(table.labels) for table in self.tables)
-        return Several(reading for table in self.tables for reading in table.readings(n_readings))
+        return tuple(reading for table in self.tables for reading in table.readings(n_readings))
 
     @property
-    def outliers(self) -> Several[CheckedReading]:
+    def outliers(self) -> tuple[CheckedReading, ...]:
         """Outliers, the farthest first: so far out that a healthy fit has one in a hundred fits."""
-        return Several(sorted((r for r in self.readings if r.outlier), key=lambda r: r.p_value))
+        return tuple(sorted((r for r in self.readings if r.outlier), key=lambda r: r.p_value))
 
     @property
-    def influential(self) -> Several[CheckedReading]:
+    def influential(self) -> tuple[CheckedReading, ...]:
         """Readings without which the fit would change markedly, the most influential first."""
-        return Several(sorted((r for r in self.readings if r.influential), key=lambda r: -r.pareto_k))
+        return tuple(sorted((r for r in self.readings if r.influential), key=lambda r: -r.pareto_k))
 
     @property
-    def conflicts(self) -> Several[Sensitivity]:
+    def conflicts(self) -> tuple[Sensitivity, ...]:
         """Quantities that a prior and the readings pull to different values."""
-        return Several(s for s in self.sensitivities if s.diagnosis == "conflict")
+        return tuple(s for s in self.sensitivities if s.diagnosis == "conflict")
 
 
 @cached_per_fit

@@ -1,5 +1,6 @@
 """A data set that was checked, in words: what was understood, row by row, and what the measurements cannot determine."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
+from bowdenfit.display import Block, Preformatted, Title, blocks_of, render_text, separate
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.frames import Frame
 from bowdenfit.kinds import iterate_tables
@@ -28,9 +30,6 @@ class Report(Dataset):
     def warnings(self) -> list[str]:
         """Warnings about what the measurements cannot determine, as far as counting shows."""
         return collect_warnings(self)
-
-    def __str__(self) -> str:
-        return describe_data_set(self).strip()
 
 
 def check_data_set(dataset: str | Path | Dataset | Frame, reading: Reading) -> Report:
@@ -60,51 +59,53 @@ def check_data_set(dataset: str | Path | Dataset | Frame, reading: Reading) -> R
 
 
 def describe_data_set(dataset: Dataset) -> str:
-    """Describe what was understood of a data set."""
+    """Describe what was understood of a data set, as text."""
+    return render_text(data_set_blocks(dataset))
+
+
+@blocks_of.register(Report)
+def data_set_blocks(dataset: Dataset) -> list[Block]:
+    """Return what was understood of a data set."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = [filled(f"Warning: {warning}") for warning in collect_warnings(dataset)]
+    warnings = [f"Warning: {warning}" for warning in collect_warnings(dataset)]
     state = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
-    lines = [description.name, "=" * len(description.name), f"Everything could be read. {state}", ""]
-    if description.route:
-        route = description.route
-        choices = f"; {counted(len(route.choices), 'length')} can be bought" if route.choices else ""
-        line = f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
-        lines.append(kept_narrow(line))
-    else:
-        lines.append("Route: none, so there is no length to choose.")
-    lines += ["", "Contacts:"]
-    lines += [
-        kept_narrow(
-            f"{c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}"
-            f"{_describe_angle_source(c, description)}",
-            "  ",
-        )
+    contacts = [
+        f"{c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}{_describe_angle_source(c, description)}"
         for c in description.contact
     ]
-    lines += ["", "Friction coefficients:"]
-    settings = {name: _describe_setting(description.friction.get(name)) for name in description.coefficients}
-    lines += [
-        kept_narrow(f"{name}: {setting}{_groups_note(dataset, name)}", "  ") for name, setting in settings.items()
+    settings = [
+        f"{name}: {_describe_setting(description.friction.get(name))}{_groups_note(dataset, name)}"
+        for name in description.coefficients
     ]
-    lines += ["", "Measurements:"]
-    sections: list[str] = []
-    for kind, table in iterate_tables(measurements):
-        described = [kept_narrow(line, "  ") for line in kind.describe(table, description)]
-        if kind.heading:
-            sections += ["", f"{kind.heading}:", *described]
-        else:
-            lines += described
-    if description.cable.sharp_bend:
-        lines.append(kept_narrow(f"note: {description.cable.sharp_bend}", "  "))
-    lines += sections
-    lines += [kept_narrow(f"note: {remark}", "  ") for remark in measurements.remarks]
-    lines += [
-        "",
-        "Rows of the files:",
-        *(f"  {line}" for words in describe_rows(dataset) for line in words.splitlines()),
-    ]
-    lines += ["", *warnings] if warnings else []
-    return "\n".join(lines) + "\n"
+    described = [(kind.heading, list(kind.describe(table, description))) for kind, table in iterate_tables(measurements)]
+    lines = [line for heading, table_lines in described if not heading for line in table_lines]
+    lines += [f"note: {description.cable.sharp_bend}"] if description.cable.sharp_bend else []
+    sections = [("Measurements", lines), *((heading, table_lines) for heading, table_lines in described if heading)]
+    sections[-1][1].extend(f"note: {remark}" for remark in measurements.remarks)
+    rows = (line for words in describe_rows(dataset) for line in words.splitlines())
+    return separate(
+        [Title(description.name), f"Everything could be read. {state}"],
+        [_describe_route(description)],
+        _list_lines("Contacts", contacts),
+        _list_lines("Friction coefficients", settings),
+        *(_list_lines(heading, section_lines) for heading, section_lines in sections),
+        ["Rows of the files:", Preformatted("\n".join(f"  {line}" for line in rows))],
+        warnings,
+    )
+
+
+def _describe_route(description: Description) -> str:
+    """Describe the route, or that there is none."""
+    route = description.route
+    if route is None:
+        return "Route: none, so there is no length to choose."
+    choices = f"; {counted(len(route.choices), 'length')} can be bought" if route.choices else ""
+    return f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
+
+
+def _list_lines(heading: str, lines: Iterable[str]) -> list[Block]:
+    """Return indented lines under a heading."""
+    return [f"{heading}:", Preformatted("\n".join(kept_narrow(line, "  ") for line in lines))]
 
 
 def _groups_note(dataset: Dataset, coefficient: str) -> str:

@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import stdtr
 
-from bowdenfit.display import Part
 from bowdenfit.inference.predictive_checks import LooPredictive, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds import find_readings
@@ -16,8 +15,8 @@ _MIN_DEGREES_OF_FREEDOM = 5  # for the tails of a prediction by few readings; a 
 FALSE_ALARM = 0.01  # chosen: share of healthy fits that are said to have an outlier; the same for the other alarms
 
 
-@dataclass(frozen=True, repr=False)
-class CheckedReading(Part):
+@dataclass(frozen=True)
+class CheckedReading:
     """One reading beside its prediction from all the others.
 
     Args:
@@ -67,8 +66,8 @@ class CheckedReading(Part):
         return None if self.is_bound else self.reading
 
 
-@dataclass(frozen=True, repr=False)
-class TableChecks(Part):
+@dataclass(frozen=True)
+class TableChecks:
     """All readings of one table.
 
     Args:

@@ -36,20 +36,20 @@ def describe_checks(checks: Checks | None) -> str:
     return "\n".join([_HEADING, *(filled(sentence) for sentence in sentences if sentence)])
 
 
-def describe_checks_alone(checks: Checks) -> str:
+def check_sentences(checks: Checks) -> list[str]:
     """Describe the checks for a page of their own: outliers come first.
 
     Args:
         checks: The checks.
     """
-    sentences = [
+    sentences = (
         _describe_outliers(checks),
         _describe_coverage(checks),
         _describe_influential(checks),
         _describe_outside_range(checks),
         describe_prior_influence(checks),
-    ]
-    return "\n".join(filled(sentence) for sentence in sentences if sentence)
+    )
+    return [sentence for sentence in sentences if sentence]
 
 
 def _name_reading(reading: CheckedReading) -> str:

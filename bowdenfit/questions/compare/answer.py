@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.description import Description
-from bowdenfit.display import Display, Named, Rows, Several
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import ElpdDifference, LooPrediction, compare_predictions, stacking_weights
 from bowdenfit.inference.interval import Interval
@@ -126,9 +126,9 @@ class Comparison(Display):
         return self.differences[name].verdict(len(self.readings))
 
     @property
-    def fits(self) -> Several[dict[str, Any]]:
+    def fits(self) -> tuple[dict[str, Any], ...]:
         """How well each predicts, the best first."""
-        return Several(
+        return tuple(
             {
                 "name": name,
                 "model": self.descriptions[name],
@@ -148,9 +148,9 @@ class Comparison(Display):
         return self.fits, {name: "1" for name, value in self.fits[0].items() if isinstance(value, float)}
 
     @property
-    def predicted_readings(self) -> Several[dict[str, Any]]:
+    def predicted_readings(self) -> tuple[dict[str, Any], ...]:
         """What each fit says of each reading."""
-        return Several(
+        return tuple(
             {
                 "table": table,
                 "label": label,
@@ -160,14 +160,14 @@ class Comparison(Display):
         )
 
     @property
-    def intervals(self) -> Named[dict[str, Interval]]:
+    def intervals(self) -> dict[str, dict[str, Interval]]:
         """Parameters by name and fit."""
-        return Named({name: row.by_fit for name, row in self.parameters.items()})
+        return {name: row.by_fit for name, row in self.parameters.items()}
 
     @property
-    def optimal_lengths(self) -> Named[Any]:
+    def optimal_lengths(self) -> dict[str, dict[str, Any]]:
         """Optimal lengths by fit, with their unit."""
-        return Named({name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()})
+        return {name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()}
 
 
 def compare_fits(

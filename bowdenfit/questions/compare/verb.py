@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bowdenfit.arguments import FITS, HIDDEN, Output, read_first
+from bowdenfit.display import render_text
 from bowdenfit.questions import compare as room
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
 from bowdenfit.stage_bar import Watch, show_progress_bar
@@ -59,7 +60,7 @@ def compare(
             output,
             NAME,
             comparison,
-            room.comparison_text(comparison),
+            render_text(room.comparison_blocks(comparison)),
             {NAME: room.comparison_figure},
             cable,
             room.comparison_page(comparison),
@@ -70,7 +71,7 @@ def compare(
 def _reply(comparison: "Comparison", options: dict[str, Any]) -> Reply:
     notes = (f"Wrote {options['output']}.",) if options["output"] else ()
     exit_code = 0 if comparison.trusted else NOT_TRUSTED
-    return Reply(room.comparison_text(comparison), lambda: comparison, notes, exit_code, csv=comparison.to_csv)
+    return Reply(render_text(room.comparison_blocks(comparison)), lambda: comparison, notes, exit_code, csv=comparison.to_csv)
 
 
 def _show(bar: Any, sentence: str) -> None:

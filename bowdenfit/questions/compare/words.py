@@ -5,14 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bowdenfit.display import text_of
+from bowdenfit.display import Block, Legend, ResultTable, render_text, separate
 from bowdenfit.inference.comparison import FEW_READINGS
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import HtmlPage, PageTable, Picture, make_meanings_table, prose_section
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.comparison_figure import HEADING, caption
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED
-from bowdenfit.words import counted, filled, give_or_take, legend, listed, narrow_table
+from bowdenfit.words import counted, give_or_take, listed
 
 _DOMINANT_SHARE = 0.5  # share of a difference from which one reading is named; a judgement
 _MAX_LISTED = 20  # readings treated one by one that are named; a judgement
@@ -22,19 +22,17 @@ HOW_WELL, WHAT_CHANGES = "How well each predicts a reading left out", "What chan
 _SHORT_METHODS = {"importance sampling": "-", "moment matching": "moved", "refit": "fitted again", "rough": "rough"}
 
 
-@text_of.register(Comparison)
-def comparison_text(comparison: Comparison) -> str:
+def comparison_blocks(comparison: Comparison) -> list[Block]:
     """Return a comparison for people: which fit predicts best, what changes between them, and what speed does."""
-    blocks = [
-        "\n".join(filled(line) for line in verdict_sentences(comparison)),
-        f"{HOW_WELL}\n" + narrow_table(*score_table(comparison), left=("model",)),
-        "\n".join(filled(line) for line in basis_sentences(comparison)),
-        influential_text(comparison),
-        f"{WHAT_CHANGES}\n" + narrow_table(*parameter_table(comparison)),
-        legend({name: row.meaning for name, row in comparison.parameters.items()}),
-        "\n".join(filled(line) for line in speed_sentences(comparison)),
-    ]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return separate(
+        verdict_sentences(comparison),
+        [HOW_WELL, ResultTable(*score_table(comparison), left=("model",), narrow=True)],
+        basis_sentences(comparison),
+        influential_blocks(comparison),
+        [WHAT_CHANGES, ResultTable(*parameter_table(comparison), narrow=True)],
+        [Legend({name: row.meaning for name, row in comparison.parameters.items()})],
+        speed_sentences(comparison),
+    )
 
 
 def comparison_page(comparison: Comparison) -> HtmlPage:
@@ -53,7 +51,7 @@ def comparison_page(comparison: Comparison) -> HtmlPage:
             "How well each predicts",
             basis_sentences(comparison),
             [PageTable(heads, tuple(rows), HOW_WELL, left=(0, 1))],
-            folded=[("Influential readings", influential_text(comparison))],
+            folded=[("Influential readings", render_text(influential_blocks(comparison)).strip())],
             pictures=(Picture("comparison", HEADING, caption(comparison)),),
         ),
         prose_section(
@@ -199,7 +197,7 @@ def basis_sentences(comparison: Comparison) -> list[str]:
     return lines
 
 
-def influential_text(comparison: Comparison) -> str:
+def influential_blocks(comparison: Comparison) -> list[Block]:
     """Say which readings importance sampling could not leave out, and what was done instead."""
     names = list(comparison.differences)
     ways = {name: comparison.predictions[name].how for name in names}
@@ -207,23 +205,22 @@ def influential_text(comparison: Comparison) -> str:
         i for i in range(len(comparison.readings)) if any(ways[name][i] != "importance sampling" for name in names)
     ]
     if not which:
-        return ""
+        return []
     rough = sum(how.count("rough") for how in ways.values())
-    lines = [
+    blocks: list[Block] = [
         "Influential readings (the fit would change without them) were left out by moment matching (moving the "
         "draws to where they would be without them) or, where that was not enough, by fitting again."
     ]
     if rough:
-        lines.append(
+        blocks.append(
             f"For {counted(rough, 'reading')} the fit without it did not converge: take the differences as rough."
         )
     if len(which) > _MAX_LISTED:
-        lines.append(f"That concerns {len(which)} of {len(comparison.readings)} readings.")
-        return "\n".join(filled(line) for line in lines)
+        return [*blocks, f"That concerns {len(which)} of {len(comparison.readings)} readings."]
     rows = [
         (_format_reading(comparison.readings[i]), *(_SHORT_METHODS[ways[name][i]] for name in names)) for i in which
     ]
-    return "\n".join([*(filled(line) for line in lines), narrow_table(("reading", *short_names(names)), rows)])
+    return [*blocks, ResultTable(("reading", *short_names(names)), rows, narrow=True)]
 
 
 def parameter_table(comparison: Comparison) -> Cells:

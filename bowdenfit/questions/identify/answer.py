@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from bowdenfit.display import Display, Named, Rows, text_of
+from bowdenfit.display import Block, Display, Legend, ResultTable, Rows, blocks_of, separate
 from bowdenfit.inference.identifiability import (
     IDENTIFIABLE,
     PRIOR_DOMINATED,
@@ -13,7 +13,7 @@ from bowdenfit.inference.identifiability import (
     ParameterContraction,
 )
 from bowdenfit.results.serialization import deserialize, values_by_key
-from bowdenfit.words import decimals, filled, legend, listed, narrow_table, percent, significant
+from bowdenfit.words import capitalized, decimals, listed, percent, significant
 
 if TYPE_CHECKING:
     from bowdenfit.inference.profiles import Profile
@@ -77,9 +77,9 @@ class Identifiability(Display):
         return [{key: value for key, value in row.items() if key != "name"} for row in rows], self.units
 
     @property
-    def rises(self) -> Named[Any]:
+    def rises(self) -> dict[str, dict[str, Any]]:
         """Profiles by the name of their coefficient."""
-        return Named({p.name: Named({"value": p.values, "rise": p.rise}) for p in self.profiles})
+        return {p.name: {"value": p.values, "rise": p.rise} for p in self.profiles}
 
 
 def describe_identified(analysis: CovarianceAnalysis, measured: bool, opening: str = "") -> str:
@@ -120,28 +120,27 @@ def rebuild_identifiability(stored: Mapping[str, Any]) -> Identifiability:
     return Identifiability(stored["name"], stored["basis"], stored["measured"], groups, **words)
 
 
-@text_of.register(Identifiability)
-def identifiability_text(result: Identifiability) -> str:
+@blocks_of.register(Identifiability)
+def identifiability_blocks(result: Identifiability) -> list[Block]:
     """Describe what measurements determine: the answer first, then parameters and combinations."""
     first, *others = result.sentences() or ["There is nothing to determine."]
-    blocks = ["\n".join(filled(sentence) for sentence in [f"{result.name}: {first[0].lower()}{first[1:]}", *others])]
+    tables = []
     for name, group in result.groups.items():
         units = result.units if name != CURVES else {}  # of which numbers on a logarithmic scale have none that people know
-        blocks.append(_parameter_table(name, group, units))
-        if name != CURVES:
-            blocks.append(_combination_table(group))
+        tables += [_parameter_blocks(name, group, units), _combination_blocks(group) if name != CURVES else []]
     named = {p.name for group in result.groups.values() for p in group.parameters}
-    blocks.append(legend({name: what for name, what in result.meanings.items() if name in named}))
-    blocks.append(
-        filled(
+    return separate(
+        [f"{result.name}: {first[0].lower()}{first[1:]}", *others],
+        *tables,
+        [Legend({name: meaning for name, meaning in result.meanings.items() if name in named})],
+        [
             f"Judged at {result.basis}. ± is one standard deviation, now and before anything was measured (the prior); "
             "determined by: whether the measurements or the prior determine the value, with their share of the prior variance."
-        )
+        ],
     )
-    return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) -> str:
+def _parameter_blocks(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) -> list[Block]:
     """Return the parameters of a group in a table, and which are hard to tell apart."""
     heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "determined by")
     unit = {p.name: units.get(p.name, "1") for p in group.parameters}
@@ -151,12 +150,12 @@ def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, s
     ]
     if set(unit.values()) <= {"1"}:
         heads, rows = (*heads[:4], *heads[5:]), [(*row[:4], *row[5:]) for row in rows]
-    text = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "determined by"))
     correlated = [sorted((p.name, p.most_correlated)) for p in group.parameters if abs(p.correlation) > _CORRELATED]
     pairs = [f"{first} and {second}" for first, second in dict.fromkeys(map(tuple, correlated))]
     if len(group.parameters) > 1 and not group.collinearity < _COLLINEAR:
         pairs = [*pairs, "all of them together"]
-    return "\n".join([text, filled(f"Strongly correlated, hard to separate: {'; '.join(pairs)}.")]) if pairs else text
+    note = f"Strongly correlated, hard to separate: {'; '.join(pairs)}." if pairs else ""
+    return [f"{capitalized(name)}, one by one", ResultTable(heads, rows, left=("unit", "determined by"), narrow=True), note]
 
 
 def _format_numbers(p: ParameterContraction) -> tuple[str, str, str]:
@@ -172,12 +171,12 @@ def _describe_source(share: float) -> str:
     return f"prior ({percent(share, 0)})" if share > PRIOR_DOMINATED else f"both (prior {percent(share, 0)})"
 
 
-def _combination_table(group: CovarianceAnalysis) -> str:
+def _combination_blocks(group: CovarianceAnalysis) -> list[Block]:
     """Return independent combinations in a table, the best determined first; empty of a single parameter."""
     if len(group.directions) < 2:
-        return ""
+        return []
     rows = [(combination.words, *_format_sum(combination)) for combination in group.directions]
-    return "Independent sums, the best determined first\n" + narrow_table(("", "value", "known to"), rows)
+    return ["Independent sums, the best determined first", ResultTable(("", "value", "known to"), rows, narrow=True)]
 
 
 def _format_sum(d: Combination) -> tuple[str, str]:

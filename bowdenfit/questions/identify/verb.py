@@ -47,21 +47,21 @@ def identify(
     result = room.identify_source(source, reading)
     if output is not None:
         figures = {NAME: room.identifiability_figure}
-        write_answer(output, NAME, result, room.identifiability_text(result), figures, result.name)
+        write_answer(output, NAME, result, f"{result}\n", figures, result.name)
     return result
 
 
 def _reply(result: "Identifiability", options: dict[str, Any]) -> Reply:
     """Return what the command line prints."""
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
-    return Reply(room.identifiability_text(result), lambda: result, notes, csv=result.to_csv)
+    return Reply(f"{result}\n", lambda: result, notes, csv=result.to_csv)
 
 
 def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:
     """Return the reply of a stored answer, for people alone: profiles need the model."""
     if "identify" not in answers or any(value for name, value in options.items() if name != "source"):
         return None
-    return Reply(room.identifiability_text(room.rebuild_identifiability(answers["identify"])))
+    return Reply(f"{room.rebuild_identifiability(answers['identify'])}\n")
 
 
 VERB = Verb(

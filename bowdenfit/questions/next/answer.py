@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
@@ -116,8 +116,8 @@ def _make_efficiency_target(fit: Record, name: str, where: str) -> TargetQuantit
     )
 
 
-@dataclass(frozen=True, repr=False)
-class RankedCandidate(Part):
+@dataclass(frozen=True)
+class RankedCandidate:
     """One candidate and what it would do.
 
     Args:
@@ -203,8 +203,8 @@ class PlannedMeasurement:
     sd: float
 
 
-@dataclass(frozen=True, repr=False)
-class LoadAndStroke(Part):
+@dataclass(frozen=True)
+class LoadAndStroke:
     """At which load and of which stroke the readings of the best candidate tell most.
 
     Args:

@@ -8,7 +8,6 @@ import jax
 import numpy as np
 
 import bowdenfit.questions.next.words  # noqa: F401  registers the text of the answer
-from bowdenfit.display import Several
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.forces.next_run import typical_run
@@ -177,7 +176,7 @@ def _rank(
                 i == first or is_as_good(of_first, of_this), price[i] if costs else None,
             )
         )  # fmt: skip
-    return Several(ranked)
+    return tuple(ranked)
 
 
 def _divide_by_price(explained: Explained, price: float) -> Explained:

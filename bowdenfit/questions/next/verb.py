@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import ANSWER, PATH, RESULTS, TEXTS, Output, numbers_by_name, read_first, whole_number
+from bowdenfit.display import render_text
 from bowdenfit.questions import next as room
 from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
@@ -53,14 +54,14 @@ def next_measurement(
     record = room.open_fit(fit)
     ranking = room.rank_measurements(record, answer, candidates, costs)
     if output is not None:
-        text = room.next_measurement_text(ranking, top)
+        text = render_text(room.ranking_blocks(ranking, top))
         write_answer(output, NAME, ranking, text, {NAME: room.next_figure}, record.name)
     return ranking
 
 
 def _reply(ranking: "NextMeasurement", options: dict[str, Any]) -> Reply:
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
-    return Reply(room.next_measurement_text(ranking, options["top"]), lambda: ranking, notes, csv=ranking.to_csv)
+    return Reply(render_text(room.ranking_blocks(ranking, options["top"])), lambda: ranking, notes, csv=ranking.to_csv)
 
 
 VERB = Verb(

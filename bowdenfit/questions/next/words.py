@@ -2,12 +2,12 @@
 
 import math
 
-from bowdenfit.display import text_of
+from bowdenfit.display import Block, ResultTable, blocks_of, separate
 from bowdenfit.kinds.candidate import STROKE_WORDS
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate, SecondMounting
-from bowdenfit.words import decimals, few, filled, percent, significant, table
+from bowdenfit.words import decimals, few, percent, significant
 
 TITLE = "What to measure next"
 HOW_TO_READ = (
@@ -18,8 +18,8 @@ _MAX_NAMED = 3  # candidates as good as the best that are named in the sentence;
 _MAX_ROWS = 10  # of the table in the report; a judgement
 
 
-@text_of.register(NextMeasurement)
-def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
+@blocks_of.register(NextMeasurement)
+def ranking_blocks(ranking: NextMeasurement, top: int = 10) -> list[Block]:
     """Say what to measure next and when to stop, in sentences and a table of the best candidates.
 
     Args:
@@ -27,15 +27,10 @@ def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
         top: How many candidates the table shows.
     """
     if ranking.second_mounting is not None:  # beside which averages over all outcomes would mislead
-        return "\n".join(filled(line) for line in ranking_sentences(ranking)) + "\n"
+        return list(ranking_sentences(ranking))
     more = len(ranking.ranked) - top
-    lines = [
-        "\n".join(filled(line) for line in ranking_sentences(ranking)),
-        table(*ranking_table(ranking, top))
-        + (f"\n... and {more} more, ranked lower; --top {len(ranking.ranked)} shows all." if more > 0 else ""),
-        filled(HOW_TO_READ),
-    ]
-    return "\n\n".join(lines) + "\n"
+    lower = [f"... and {more} more, ranked lower; --top {len(ranking.ranked)} shows all."] if more > 0 else []
+    return separate(ranking_sentences(ranking), [ResultTable(*ranking_table(ranking, top)), *lower], [HOW_TO_READ])
 
 
 def ranking_section(ranking: NextMeasurement) -> PageSection:

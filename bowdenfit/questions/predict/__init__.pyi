@@ -6,5 +6,5 @@ from .gait import read_stated_angles as read_stated_angles
 from .lengths import choose_route_values as choose_route_values
 from .lengths import predict_at_lengths as predict_at_lengths
 from .predictions import Predictions as Predictions
-from .predictions import predictions_text as predictions_text
+from .predictions import prediction_blocks as prediction_blocks
 from .table import predict_table as predict_table

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bowdenfit.display import Display, Rows
-from bowdenfit.words import decimals, few, filled, narrow_table, percent, significant
+from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
+from bowdenfit.words import decimals, few, percent, significant
 
 Row = Mapping[str, Any]
 _UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N_m": "N*m", "N": "N", "mm": "mm", "deg": "deg"}
@@ -13,23 +13,21 @@ _MOUNTING, _PROBABILITY = "mounting", "_probability"
 _RATIOS = ("dynamic_range",)  # quantities without a unit
 
 
-def predictions_text(rows: Sequence[Row]) -> str:
+def prediction_blocks(rows: Sequence[Row]) -> list[Block]:
     """Describe predictions: the answer in a sentence, of several places in a table, and what lies outside.
 
     Args:
         rows: One a place.
     """
     if not rows:
-        return "Nothing was asked for.\n"
+        return ["Nothing was asked for."]
     if ROW in rows[0]:
         return _table_of_rows(rows)
     if "in_words" in rows[0]:
-        return filled(rows[0]["in_words"]) + "\n"
-    several = len(rows) > 1
-    blocks = [filled(_highest_and_lowest(rows)) if several else "\n".join(filled(line) for line in _single_prediction(rows[0]))]
-    blocks += [_prediction_table(rows)] if several else []
-    blocks += ["\n".join(filled(note) for note in _note_lines(rows))]
-    return "\n\n".join(block for block in blocks if block) + "\n"
+        return [rows[0]["in_words"]]
+    if len(rows) == 1:
+        return separate(_single_prediction(rows[0]), _note_lines(rows))
+    return separate([_highest_and_lowest(rows)], [_prediction_table(rows)], _note_lines(rows))
 
 
 def column_units(row: Row) -> dict[str, str]:
@@ -119,7 +117,7 @@ def _highest_and_lowest(rows: Sequence[Row]) -> str:
     return f"{sentence}. 90 % intervals are in brackets."
 
 
-def _table_of_rows(rows: Sequence[Row]) -> str:
+def _table_of_rows(rows: Sequence[Row]) -> list[Block]:
     """Return predictions row by row of a table, with what each row states."""
     stated = list(rows[0])[: list(rows[0]).index(_quantities(rows[0])[0])]
     columns = [[_stated_heading(name), *(_stated_text(row[name]) for row in rows)] for name in stated]
@@ -128,7 +126,7 @@ def _table_of_rows(rows: Sequence[Row]) -> str:
     for note in dict.fromkeys(row["note"] for row in rows if row["note"]):
         where = [str(row[ROW]) for row in rows if row["note"] == note]
         lines.append(f"{'Everywhere' if len(where) == len(rows) > 1 else f'Row {few(where, 4)}'}: {note}.")
-    return f"{narrow_table(heads, cells)}\n\n" + "\n".join(map(filled, lines)) + "\n"
+    return separate([ResultTable(heads, cells, narrow=True)], lines)
 
 
 def _stated_heading(name: str) -> str:
@@ -140,12 +138,12 @@ def _stated_text(value: Any) -> str:
     return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _prediction_table(rows: Sequence[Row]) -> str:
+def _prediction_table(rows: Sequence[Row]) -> ResultTable:
     """Return the predictions at all places in a table."""
     name = next(iter(rows[0]))  # of several places it is there
     words, unit = _name_and_unit(name)
     heads, *cells = zip([f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], *_table_columns(rows), strict=True)
-    return narrow_table(heads, cells)
+    return ResultTable(heads, cells, narrow=True)
 
 
 def _table_columns(rows: Sequence[Row]) -> Iterator[list[str]]:
@@ -175,8 +173,8 @@ def _note_lines(rows: Sequence[Row]) -> list[str]:
 class Predictions(Display, list[dict[str, Any]]):
     """What `predict` answers; units of forces, lengths and angles stand in the names of the columns."""
 
-    def __str__(self) -> str:
-        return predictions_text(self).strip()
-
     def _table(self) -> Rows:
         return self, column_units(self[0] if self else {})
+
+
+blocks_of.register(Predictions)(prediction_blocks)

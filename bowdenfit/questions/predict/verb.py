@@ -20,7 +20,7 @@ from bowdenfit.arguments import (
     numbers_with_units_by_name,
     read_first,
 )  # fmt: skip
-from bowdenfit.display import csv_text
+from bowdenfit.display import csv_text, render_text
 from bowdenfit.errors import UsageError
 from bowdenfit.questions import predict as room
 from bowdenfit.verb import Reply, Verb
@@ -203,7 +203,7 @@ def _choose_quantity(named: QuantityName | None, input_force: Quantity | None, o
 
 def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
     """Return what the command line prints."""
-    return Reply(room.predictions_text(rows), lambda: rows, csv=lambda: csv_text(rows))
+    return Reply(render_text(room.prediction_blocks(rows)), lambda: rows, csv=lambda: csv_text(rows))
 
 
 def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bowdenfit.arguments import read_first
-from bowdenfit.display import Named
 from bowdenfit.questions import schema as room
 from bowdenfit.verb import Reply, Verb
 
@@ -14,13 +13,13 @@ File = Literal["cable", "device", "fleet", "summary"]
 
 
 @read_first
-def schema(file: Annotated[File, Parameter("FILE")]) -> Named[Any]:
+def schema(file: Annotated[File, Parameter("FILE")]) -> dict[str, Any]:
     """Return the JSON schema of a file, a dictionary of plain data.
 
     Args:
         file: Such as cable (of cable.toml), device (device.toml), fleet (fleet.toml), or summary (summary.json).
     """
-    return Named(room.make_schema(file))
+    return room.make_schema(file)
 
 
 VERB = Verb(

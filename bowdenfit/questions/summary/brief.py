@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from bowdenfit.arguments import Purpose
 from bowdenfit.cable.sensors import RUN_SCATTER
+from bowdenfit.display import Block, ResultTable, render_text, separate
 from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.kinds import describe_reading
@@ -46,42 +47,57 @@ _COEFFICIENT = "friction coefficient"
 
 
 def summary_text(fit: Record, purpose: Purpose = "design") -> str:
+    """Return the summary as text."""
+    return render_text(summary_blocks(fit, purpose))
+
+
+def summary_blocks(fit: Record, purpose: Purpose = "design") -> list[Block]:
     """Return one page for people: at most `LINES` lines, as a terminal of 80 columns shows them.
 
     Args:
         fit: The fit.
         purpose: What the answer is for; it comes first.
     """
-    (answer, verdict), outlier_lines = _sentence_lines(fit, purpose), _outlier_lines(fit)
+    (answer, verdict), outliers = _sentences(fit, purpose), _outlier_blocks(fit)
     fit_verdict = assess_for(fit, purpose)
-    sentences = [*answer, *verdict]
-    shown, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - len(outlier_lines) - _OTHER_LINES)
+    room = LINES - _count_lines([*answer, *verdict]) - _OTHER_LINES
+    shown, complete = _quantity_blocks(fit, room - _count_lines(outliers))
     if not complete and fit_verdict.trusted and not fit_verdict.doubts:  # that all readings agree is said above already
-        longer, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - _OTHER_LINES + 1)
-        shown, outlier_lines = (longer, []) if complete else (shown, outlier_lines)
-    below = [line for block in (shown, outlier_lines, [_MORE]) for line in (["", *block] if block else [])]
-    further = filled(interval_width_caveat(fit)).splitlines() if fit_verdict.trusted else []
-    if further and sum(map(len, sentences)) + len(further) + len(below) <= LINES:
+        longer, complete = _quantity_blocks(fit, room + 1)
+        shown, outliers = (longer, []) if complete else (shown, outliers)
+    below = separate(shown, outliers, [_MORE])
+    room = LINES - _count_lines(below) - 1
+    further = interval_width_caveat(fit) if fit_verdict.trusted else ""
+    if further and _count_lines([*answer, *verdict, further]) <= room:
         verdict.insert(-1, further)
-    return "\n".join([*_shorten_to(answer, verdict, LINES - len(below)), *below]) + "\n"
+    return [*_shorten_to(answer, verdict, room), "", *below]
 
 
-def _shorten_to(answer: list[list[str]], verdict: list[list[str]], room: int) -> list[str]:
+def _count_lines(blocks: Sequence[Block]) -> int:
+    """Return the number of lines that blocks have as text."""
+    return render_text(blocks).count("\n") if blocks else 0
+
+
+def _shorten_to(answer: list[str], verdict: list[str], room: int) -> list[str]:
     """Return sentences in at most so many lines: the first, the verdict, and of the rest of the answer what has room."""
-    (first, *others), last = answer, [line for sentence in verdict for line in sentence]
-    if sum(map(len, answer)) + len(last) <= room:
-        return [line for sentence in (*answer, last) for line in sentence]
-    left, kept = room - len(first) - len(last) - 1, list[list[str]]()
+    first, *others = answer
+    if _count_lines([*answer, *verdict]) <= room:
+        return [*answer, *verdict]
+    left, kept = room - _count_lines([first, *verdict]) - 1, list[str]()
     for sentence in others:
-        if (left := left - len(sentence)) < 0:
+        if (left := left - _count_lines([sentence])) < 0:
             break
         kept.append(sentence)
     more = f"[{counted(len(others) - len(kept), 'sentence')} more: bowdenfit summary --full]"
-    return [line for sentence in (first, *kept, [more], last) for line in sentence][:room]
+    sentences = [first, *kept, more, *verdict]
+    while _count_lines(sentences) > room:  # the last sentence loses its last line
+        *sentences, last = sentences
+        sentences += [" ".join(filled(last).splitlines()[:-1])] if "\n" in filled(last) else []
+    return sentences
 
 
-def _sentence_lines(fit: Record, purpose: Purpose) -> tuple[list[list[str]], list[list[str]]]:
-    """Return the lines of each sentence of the answer, and of whether to trust it and what to do next.
+def _sentences(fit: Record, purpose: Purpose) -> tuple[list[str], list[str]]:
+    """Return the sentences of the answer, and of whether to trust it and what to do next.
 
     Of a fit that is not to be trusted, why comes first and the answer last.
     """
@@ -96,11 +112,10 @@ def _sentence_lines(fit: Record, purpose: Purpose) -> tuple[list[list[str]], lis
     else:
         answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]
         verdict = [f"What they would say: {first}"]
-    first_lines, last_lines = ([filled(sentence).splitlines() for sentence in part if sentence] for part in (answer, verdict))
-    return first_lines, last_lines
+    return list(filter(None, answer)), list(filter(None, verdict))
 
 
-def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
+def _quantity_blocks(fit: Record, lines: int) -> tuple[list[Block], bool]:
     """Return the coefficients in a table of about so many rows, and whether it says in full what every one is."""
     rows_to_show = key_quantities(fit)
     shown = rows_to_show[: min(max(lines, _LEAST_QUANTITIES), _MOST_QUANTITIES)]
@@ -109,20 +124,26 @@ def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
     interval_width = max(len(q.interval) for q in shown)
     rows: list[tuple[str, ...]] = [(q.name, q.value, f"{q.interval:>{interval_width}} {q.unit}".rstrip()) for q in shown]
     heads: tuple[str, ...] = ("", "value", f"{'90 % interval':>{interval_width}}")
-    printed = table(heads, rows, left=heads[2:]).splitlines()
     if widened := _widened_intervals(fit, [q.name for q in shown]):
         wider_rows = [(*row, text) for row, text in zip(rows, widened, strict=True)]
-        wider = table((*heads, WITH_BENCH), wider_rows, left=(*heads[2:], WITH_BENCH)).splitlines()
-        printed = wider if max(map(len, wider)) <= WIDTH else printed
-    start = max(map(len, printed)) + 2
+        wider = (*heads, WITH_BENCH)
+        heads, rows = (wider, wider_rows) if _table_width(wider, wider_rows) <= WIDTH else (heads, rows)
+    room = WIDTH - _table_width(heads, rows) - 2
     more = len(rows_to_show) - len(shown)
-    lines_made, spare, complete = printed[:2], lines - len(shown) + (more <= 0), True
-    for line, q in zip(printed[2:], shown, strict=True):
-        meaning = _meaning_lines(q.description, WIDTH - start, spare)
+    meanings, spare = list[str](), lines - len(shown) + (more <= 0)
+    for q in shown:
+        meaning = _meaning_lines(q.description, room, spare)
         spare -= len(meaning) - 1
-        complete &= " ".join(meaning) == q.description
-        lines_made += [f"{line:<{start}}{meaning[0]}".rstrip(), *(" " * start + further for further in meaning[1:])]
-    return [*lines_made, *([f"and {more} more"] if more > 0 else [])], complete
+        meanings.append("\n".join(meaning))
+    complete = [meaning.replace("\n", " ") for meaning in meanings] == [q.description for q in shown]
+    if any(meanings):
+        heads, rows = (*heads, ""), [(*row, meaning) for row, meaning in zip(rows, meanings, strict=True)]
+    return [ResultTable(heads, rows, left=heads[2:]), *([f"and {more} more"] if more > 0 else [])], complete
+
+
+def _table_width(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
+    """Return the width of a table as text."""
+    return max(map(len, table(heads, rows, left=heads[2:]).splitlines()))
 
 
 def _widened_intervals(fit: Record, names: Sequence[str]) -> list[str]:
@@ -145,15 +166,15 @@ def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:
     return ["" if cut.strip() == "..." else cut]
 
 
-def _outlier_lines(fit: Record) -> list[str]:
+def _outlier_blocks(fit: Record) -> list[Block]:
     """Return the outliers beside what was expected of them; how many readings there are where none is an outlier."""
     outliers, readings = find_outliers(fit), collect_checked_readings(fit)
     if not outliers:
-        return [filled(say_no_outliers(readings))] if len(readings) > 1 else []
+        return [say_no_outliers(readings)] if len(readings) > 1 else []
     rows = [format_reading(reading) for reading in outliers[:_MOST_OUTLIERS]]
     heads = (f"Outliers: {len(outliers)} of {counted(len(readings), 'reading')}", *READING_HEADS)
     more = len(outliers) - len(rows)
-    return [*table(heads, rows).splitlines(), *([f"and {more} more"] if more > 0 else [])]
+    return [ResultTable(heads, rows), *([f"and {more} more"] if more > 0 else [])]
 
 
 def say_no_outliers(readings: Sequence[CheckedReading]) -> str:

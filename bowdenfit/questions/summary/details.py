@@ -5,6 +5,7 @@ from typing import Any
 
 from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.sensors import RUN_SCATTER
+from bowdenfit.display import render_text
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import KINKED, Estimate
 from bowdenfit.kinds import find_readings
@@ -73,7 +74,7 @@ def details_text(fit: Record) -> str:
         _measured_block(fit, page),
         describe_checks(check_readings(fit)),
         _friction_model_block(fit),
-        describe_elastic(fit),
+        render_text(describe_elastic(fit)).strip(),
         loss_text(fit),
         budget_text(fit),
         _design_answer(fit),

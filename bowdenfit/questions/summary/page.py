@@ -1,11 +1,11 @@
 """The one page that programs read: `summary.json`; people's versions are made from the same numbers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Block, Display, Rows, blocks_of
 from bowdenfit.inference.diagnostics import describe_convergence_shortfalls, quantile_error
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.interval import Interval
@@ -33,19 +33,22 @@ class Summary(Display, dict[str, Any]):
 
     Args:
         page: The contents.
-        text: Gives the same for people.
+        make_blocks: Gives the same for people.
     """
 
-    def __init__(self, page: dict[str, Any], make_text: Callable[[], str]) -> None:
+    def __init__(self, page: dict[str, Any], make_blocks: Callable[[], Sequence[Block]]) -> None:
         super().__init__(page)
-        self._text = make_text
-
-    def __str__(self) -> str:
-        return self._text()
+        self.make_blocks = make_blocks
 
     def _table(self) -> Rows:
         rows = {name: {k: v for k, v in row.items() if k != "least_squares"} for name, row in self["parameters"].items()}
         return [{"parameter": name} | row for name, row in rows.items()], {name: row["unit"] for name, row in rows.items()}
+
+
+@blocks_of.register
+def _(summary: Summary) -> Sequence[Block]:
+    """Return what people read."""
+    return summary.make_blocks()
 
 
 def summarize(fit: Record) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from bowdenfit.arguments import Purpose
 from bowdenfit.cable.sensors import RUN_SCATTER
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Display, Rows, blocks_of
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.questions.check.answer import check_readings
@@ -36,7 +36,7 @@ from bowdenfit.questions.summary.curve_departures import describe_refuted_famili
 from bowdenfit.questions.summary.usable_answers import UsableAnswers, find_usable_answers
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.results.serialization import values_by_key
-from bowdenfit.words import decimals, few, filled, listed
+from bowdenfit.words import decimals, few, listed
 
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
@@ -146,8 +146,17 @@ class Verdict(Display):
             self, troubles={**self.troubles, NOT_IDENTIFIABLE: (self.coefficients_to_leave,)}, coefficients_to_leave=""
         )
 
+    def sentences(self) -> list[str]:
+        """Return whether the fit may be trusted, and if not, why."""
+        if self.troubles:
+            return [distrust_warning(self), *reasons_against(self)]
+        return [_trusted_sentence(self) if self.sampled else _LEAST_SQUARES_ONLY.format("")]
+
     def _table(self) -> Rows:
         return [{"trouble": kind, "reason": reason} for kind, reasons in self.troubles.items() for reason in reasons], {}
+
+
+blocks_of.register(Verdict)(Verdict.sentences)
 
 
 @cached_per_fit
@@ -202,16 +211,6 @@ def find_outliers(fit: Record) -> Sequence[CheckedReading]:
     """Return the outliers among the readings, the farthest first."""
     checks = check_readings(fit)
     return checks.outliers if checks else ()
-
-
-def verdict_text(verdict_on_fit: Verdict) -> str:
-    """Say whether a fit may be trusted, and if not, why."""
-    sentences = (
-        [distrust_warning(verdict_on_fit), *reasons_against(verdict_on_fit)]
-        if verdict_on_fit.troubles
-        else [_trusted_sentence(verdict_on_fit) if verdict_on_fit.sampled else _LEAST_SQUARES_ONLY.format("")]
-    )
-    return "\n".join(filled(sentence) for sentence in sentences)
 
 
 def distrust_warning(fit_verdict: Verdict) -> str:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import begin_sentence, counted
+from bowdenfit.words import begin_sentence, counted, significant
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,6 +99,23 @@ class History(Display):
         ]
         unit = self.answers[-1].unit or "1" if self.answers else "1"
         return rows, dict.fromkeys(("mean", "sd", "median", "q05", "q95"), unit)
+
+
+@blocks_of.register
+def _(history: History) -> list[Block]:
+    """Return the history as a table, and what is known at its end."""
+    heads = ["mountings", "readings", "answer", "90 % interval", "±", "verdict", "enough"]
+    verdicts = {None: "not checked", True: "trusted", False: "DO NOT USE"}
+    rows = [
+        [
+            str(one.mountings), str(one.readings), f"{one.interval.median:z.{one.interval.digits}f}",
+            one.interval.range_text(one.interval.digits), significant(one.interval.sd, 2),
+            verdicts[one.trusted], "yes" if one.may_stop else "no",
+        ]
+        for one in history.answers
+    ]  # fmt: skip
+    stop = history.answers[-1].stop if history.answers else ""
+    return separate(*([sentence] for sentence in history.sentences()), [ResultTable(heads, rows)] if rows else [], [stop])
 
 
 def _count(answer: WatchedAnswer) -> tuple[int, int]:

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 
-from bowdenfit.display import text_of
-from bowdenfit.questions.watch.answer import History, UnreadableFiles, WatchedAnswer
-from bowdenfit.words import counted, filled, listed, significant, table
+from bowdenfit.questions.watch.answer import UnreadableFiles, WatchedAnswer
+from bowdenfit.words import counted, filled, listed, significant
 
 NOT_LOOKED_AT = "not checked, since more was measured"
 
@@ -68,22 +67,3 @@ def describe_verdict(answer: WatchedAnswer) -> str:
     if answer.warning:
         return answer.warning
     return f"trusted, but {listed(answer.doubts)}" if answer.doubts else "trusted"
-
-
-@text_of.register(History)
-def history_text(history: History) -> str:
-    """Return the history as a table, and what is known at its end."""
-    heads = ["mountings", "readings", "answer", "90 % interval", "±", "verdict", "enough"]
-    verdicts = {None: "not checked", True: "trusted", False: "DO NOT USE"}
-    rows = [
-        [
-            str(one.mountings), str(one.readings), f"{one.interval.median:z.{one.interval.digits}f}",
-            one.interval.range_text(one.interval.digits), significant(one.interval.sd, 2),
-            verdicts[one.trusted], "yes" if one.may_stop else "no",
-        ]
-        for one in history.answers
-    ]  # fmt: skip
-    lines = [*(filled(line) for line in history.sentences()), table(heads, rows) if rows else ""]
-    if history.answers and history.answers[-1].stop:
-        lines.append(filled(history.answers[-1].stop))
-    return "\n\n".join(filter(None, lines)) + "\n"

@@ -13,12 +13,10 @@ from terminal_pages import faults as faults_of_page
 import bowdenfit as bf
 from bowdenfit.addons.device.compensate import compensation_figure, compensation_traces_figure, simulation
 from bowdenfit.addons.device.compensate.limits import estimate_compensation
-from bowdenfit.addons.device.compensate.words import compensation_text
 from bowdenfit.addons.device.description import read_device
 from bowdenfit.addons.device.loop import draw_loop
 from bowdenfit.addons.device.mechanics.limits import moves_by_itself
 from bowdenfit.addons.device.teleoperate import teleoperation_figure
-from bowdenfit.addons.device.teleoperate.answer import teleoperation_text
 from bowdenfit.addons.device.teleoperate.stability import detect_bouncing, find_hardest_wall
 from bowdenfit.errors import DescriptionError, UsageError
 
@@ -100,7 +98,7 @@ def test_more_scatter_of_mountings_allows_less(fit, tmp_path, answer_at_bends):
     none = bf.compensate(fit, device(tmp_path, scatter, scatter.replace("0.01", "0")), wrap_angle=RANGE)
     assert more.scheduled.share < answer_at_bends.scheduled.share - 0.03 < none.scheduled.share
     assert none.scheduled.share == pytest.approx(answer_at_bends.share_without_scatter, abs=0.005)
-    assert "for this mounting alone" in compensation_text(none)
+    assert "for this mounting alone" in str(none)
 
 
 def test_without_a_device_what_helps_counts_as_nothing(fit, answer_at_bends, tmp_path):
@@ -110,7 +108,7 @@ def test_without_a_device_what_helps_counts_as_nothing(fit, answer_at_bends, tmp
     assert bare.fixed.torque < answer_at_bends.fixed.torque - 0.008
     assert bare.gain is None
     assert "motor.inertia" in bare.missing
-    assert "motor, inertia" in compensation_text(bare)
+    assert "motor, inertia" in str(bare)
 
 
 def test_the_gain_is_that_of_the_least_damped_ropes(answer_at_bends):
@@ -128,15 +126,15 @@ def test_what_a_controller_does_besides_is_read_and_counts(fit, answer_at_bends,
     integrated = bf.compensate(fit, path, wrap_angle=RANGE, law="active")
     assert (answer_at_bends.gain.integral, integrated.gain.integral) == (0.0, 5.0)
     assert integrated.gain.safe < answer_at_bends.gain.safe
-    text = " ".join(compensation_text(integrated).split())
+    text = " ".join(str(integrated).split())
     assert "beside 5 1/s times its integral" in text
     assert "Some hand can make it oscillate at any gain." in text
-    assert faults_of_page(compensation_text(integrated)) == []
+    assert faults_of_page(str(integrated)) == []
     none = bf.compensate(
         fit, device(tmp_path, "[controller]", message.replace("5", "300")), wrap_angle=RANGE, law="active"
     )
     assert none.gain.safe == 0
-    assert "or integrate less than 300 1/s" in " ".join(compensation_text(none).split())
+    assert "or integrate less than 300 1/s" in " ".join(str(none).split())
 
 
 def test_scales_of_positions_belong_together(fit, tmp_path):
@@ -191,7 +189,7 @@ def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     )
     assert active.mean_torque.median == pytest.approx(seen.gain.left.median, rel=0.05)
     assert seen.simulated.runaway_share <= 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 400), "0.5 % of the time by chance"
-    text = compensation_text(seen)
+    text = str(seen)
     assert faults_of_page(text) == []
     assert len(text.splitlines()) <= 25
     page = json.loads((tmp_path / "answer" / "compensation.json").read_text())
@@ -210,14 +208,14 @@ def test_words_fit_a_page_whatever_is_asked(fit, answer_at_bends):
     ]
     for answer in answers:
         assert np.isfinite(answer.scheduled.torque if answer.scheduled else answer.gain.safe)
-        text = compensation_text(answer)
+        text = str(answer)
         assert faults_of_page(text) == []
         assert len(text.splitlines()) <= 25
         assert_answer_readable(compensation_figure, answer, "Loop")
         assert "nan" not in text
     assert answers[3].fixed is None
     assert answers[2].gain is None
-    assert "slack somewhere from 0 to 90 deg" in compensation_text(answers[-1])
+    assert "slack somewhere from 0 to 90 deg" in str(answers[-1])
 
 
 def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
@@ -329,7 +327,7 @@ def test_linear_loop_and_simulation_stand_side_by_side(remote):
     """With dry friction the slave comes to rest at every wall, also where the linear loop calls contact unstable."""
     assert any(np.any(scheme.stable < 0.5) for scheme in remote.schemes)
     assert not any(scheme.bounces.any() for scheme in remote.schemes)
-    text = " ".join(teleoperation_text(remote).split())
+    text = " ".join(str(remote).split())
     assert "The linear loop calls some walls unstable with every coupling; in simulations the slave comes to rest" in text
     sure = replace(remote, at_wall=0.99, contact=replace(remote.contact, bounces=False))
     assert not sure.contradicted and replace(sure, at_wall=0.5).contradicted
@@ -370,7 +368,7 @@ def test_the_figure_of_teleoperation_is_readable(remote):
 def test_gains_that_diverge_are_said_as_such_with_the_limit_that_was_crossed(fit, tmp_path):
     hard = 'master_stiffness = { value = 5, unit = "N*m/rad" }'
     diverging = bf.teleoperate(fit, device(tmp_path, hard, hard.replace("5", "500")), wrap_angle="90deg")
-    text = " ".join(teleoperation_text(diverging).split())
+    text = " ".join(str(diverging).split())
     assert "as stated: it already oscillates in free motion, with 100 % probability" in text
     assert "at most 1 is stable" in text
     assert diverging.stated.radius > 1

@@ -22,7 +22,7 @@ from bowdenfit.addons.fleet.pool.lifetime import cycles_to_failure, rank_next_in
 from bowdenfit.addons.fleet.pool.outlier_cables import anderson_darling_p_value, outlier_p_values
 from bowdenfit.addons.fleet.pool.pooled_data import select_inspections
 from bowdenfit.addons.fleet.pool.pooling import pool_cables
-from bowdenfit.addons.fleet.pool.words import captions, pool_text
+from bowdenfit.addons.fleet.pool.words import captions
 from bowdenfit.addons.fleet.population.likelihoods import Summaries
 from bowdenfit.addons.fleet.population.model import Inspections
 from bowdenfit.addons.fleet.population.sampling import PopulationDraws, draw_population
@@ -102,12 +102,12 @@ def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, pool_an
     assert all(
         spread.median < 0.4 for spread in pool_answer.spreads.values()
     )  # of the others; 0.5 with the one that is five times off
-    text = " ".join(pool_text(pool_answer).split())
+    text = " ".join(str(pool_answer).split())
     assert "They are shown by their own inspections alone" in text and "said without them" in text
     assert "Only the wear" not in text
     cables = tuple(replace(cable, pooled=("wear",)) if cable.cable == "cable-03" else cable for cable in pool_answer.cables)
     assert "Only the wear of cable-03 is that of the others" in " ".join(
-        pool_text(replace(pool_answer, cables=cables)).split()
+        str(replace(pool_answer, cables=cables)).split()
     )
     rows = csv.DictReader(io.StringIO(pool_answer.to_csv()))
     pooled_by_cable = {row["cable"]: row["pooled"] for row in rows if row["quantity"] == "wear"}
@@ -115,22 +115,22 @@ def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, pool_an
 
 
 def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(pool_answer):
-    assert "all cables are alike" not in pool_text(pool_answer) and "All cables differ" not in pool_text(pool_answer)
+    assert "all cables are alike" not in str(pool_answer) and "All cables differ" not in str(pool_answer)
     no_spread = {name: replace(spread, q05=0.001, q95=0.02) for name, spread in pool_answer.spreads.items()}
-    text = pool_text(replace(pool_answer, spreads=no_spread))
+    text = str(replace(pool_answer, spreads=no_spread))
     assert "all cables are alike: they differ by at most 2.0 %" in " ".join(text.split())
     expected = {**no_spread, "wear": pool_answer.spreads["wear"]}
-    assert "all cables are alike" not in pool_text(replace(pool_answer, spreads=expected))
+    assert "all cables are alike" not in str(replace(pool_answer, spreads=expected))
     wide = replace(pool_answer.coefficients["mu_1"], q05=0.02, q95=0.2)
     apart = replace(pool_answer, coefficients={"mu_0": wide, "mu_1": wide}, mixtures={})
-    assert "All cables differ" not in pool_text(apart)
+    assert "All cables differ" not in str(apart)
     nobody = tuple(replace(cable, departure="") for cable in pool_answer.cables)
-    assert "All cables differ in mu_0 (" in " ".join(pool_text(replace(apart, cables=nobody)).split())
-    assert "mu_1 (0.02 to 0.2 of nine in ten)" in " ".join(pool_text(replace(apart, cables=nobody)).split())
+    assert "All cables differ in mu_0 (" in " ".join(str(replace(apart, cables=nobody)).split())
+    assert "mu_1 (0.02 to 0.2 of nine in ten)" in " ".join(str(replace(apart, cables=nobody)).split())
 
 
 def test_words_answer_first_and_keep_to_the_page(pool_answer):
-    text = pool_text(pool_answer)
+    text = str(pool_answer)
     assert text.startswith("made: ") and "below 60 % after" in text.splitlines()[0]
     assert max(len(line.encode()) for line in text.splitlines()) <= 80
     assert "cable-03 is an outlier" in text and "Inspect cable-" in text
@@ -411,22 +411,22 @@ def test_one_cable_has_no_population():
     draws, _ = fleet_draws(1, cables=1)
     alone = pool(draws, ASKED)
     assert alone.new_cable is None and not alone.outliers and not alone.spreads
-    assert "one cable only" in pool_text(alone)
+    assert "one cable only" in str(alone)
 
 
 @pytest.mark.slow
 def test_fleets_without_and_with_nothing_in_common():
     """Of one kind to the last digit, and of two times the spread that anybody expects."""
     alike = pool(fleet_draws(21, truth=Truth(spread=0.0, wear_spread=0.0))[0])
-    assert "all cables are alike" in pool_text(alike) and not alike.outliers
+    assert "all cables are alike" in str(alike) and not alike.outliers
     unlike = pool(fleet_draws(22, cables=16, truth=Truth(spread=1.0))[0])
-    assert "All cables differ in mu_0" in pool_text(unlike)
+    assert "All cables differ in mu_0" in str(unlike)
 
 
 @pytest.mark.slow
 def test_two_makes_pooled_as_one_are_seen():
     draws, _ = fleet_draws(11, cables=20, shifts=dict.fromkeys(range(10), 1.5), truth=Truth(spread=0.15))
     pooled = pool(draws)
-    assert pooled.mixtures and "do not look like one population" in pool_text(pooled)
+    assert pooled.mixtures and "do not look like one population" in str(pooled)
     alike, _ = fleet_draws(12, cables=20)
     assert not pool(alike).mixtures

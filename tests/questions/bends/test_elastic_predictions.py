@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from bowdenfit.description import Description
+from bowdenfit.display import render_text
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.questions.bends.words import describe_elastic
@@ -322,4 +323,4 @@ def test_a_bend_below_twenty_rope_diameters_is_warned_of_in_check_and_summary(di
     fit = known_fit(elastic_cable(("stretch",), cable=sizes), spread=0.01, n=4)
     says = re.compile(r"bend radius is [\d.]+ rope diameters")
     assert bool(says.search(describe_data_set(fit.dataset))) == sharp
-    assert bool(says.search(" ".join(describe_elastic(fit).split()))) == sharp
+    assert bool(says.search(" ".join(render_text(describe_elastic(fit)).split()))) == sharp

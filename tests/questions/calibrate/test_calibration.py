@@ -27,7 +27,7 @@ from bowdenfit.questions.calibrate.calibration import CalibrationJob, run_piece,
 from bowdenfit.questions.calibrate.rank_tests import UniformRanks, summarize_replications
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication, append_replication, open_replications
 from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator
-from bowdenfit.questions.calibrate.words import calibration_page, calibration_text, details_text, draw_calibration
+from bowdenfit.questions.calibrate.words import calibration_page, details_text, draw_calibration
 from bowdenfit.questions.simulate.tables import empty_tables
 from bowdenfit.questions.writing import write_page
 
@@ -92,8 +92,8 @@ def test_right_intervals_are_called_calibrated():
     (mu,) = calibration.quantities
     assert calibration.is_calibrated
     assert mu.shrinkage == pytest.approx(1 - 0.09)
-    assert "CALIBRATED: for this description" in calibration_text(calibration)
-    assert "29 simulated data sets were drawn again" in calibration_text(calibration)
+    assert "CALIBRATED: for this description" in str(calibration)
+    assert "29 simulated data sets were drawn again" in str(calibration)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_wrong_intervals_are_said_to_be_wrong_in_their_direction(sd, shift, faul
     calibration = summarize_replications(replications(200, sd, shift), {})
     assert not calibration.is_calibrated
     assert fault in calibration.faults["mu"]
-    text = calibration_text(calibration)
+    text = str(calibration)
     assert "NOT CALIBRATED" in text
     assert f"- mu: {calibration.faults['mu']}." in text.replace("\n  ", " ")
 
@@ -113,18 +113,18 @@ def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_l
     calibration = summarize_replications(replications(100, bad=5), {})
     assert calibration.ranked == 95
     assert calibration.is_conclusive
-    assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in calibration_text(calibration)
-    assert "they are, they would change nothing." in " ".join(calibration_text(calibration).split())
+    assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in str(calibration)
+    assert "they are, they would change nothing." in " ".join(str(calibration).split())
     spoiled = [
         replace(item, ranked={"mu": replace(item.ranked["mu"], rank=0.01)}) for item in replications(100, bad=10)[:10]
     ]
     suspect = summarize_replications([*spoiled, *replications(100, bad=10)[10:]], {})
     assert not suspect.faults
     assert suspect.faults_with_all == {"mu": "ranks are not uniform"}
-    assert "mu (ranks are not uniform) would be wrong" in " ".join(calibration_text(suspect).split())
+    assert "mu (ranks are not uniform) would be wrong" in " ".join(str(suspect).split())
     worse = summarize_replications(replications(100, bad=30), {})
     assert not worse.is_calibrated
-    assert "NOT JUDGED: 70 of 100" in calibration_text(worse)
+    assert "NOT JUDGED: 70 of 100" in str(worse)
 
 
 def test_a_calibration_s_figures_show_every_quantity():

@@ -14,7 +14,6 @@ from bowdenfit.questions.calibrate.plan import StatedTruth, parse_truths, read_t
 from bowdenfit.questions.calibrate.rank_tests import estimate_power, summarize_replications
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication
 from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator
-from bowdenfit.questions.calibrate.words import calibration_text
 from bowdenfit.questions.simulate.tables import empty_tables
 
 pytestmark = pytest.mark.extended
@@ -122,7 +121,7 @@ def test_only_coefficients_and_the_optimum_are_judged_and_only_by_their_interval
     assert set(summarize_replications(made, expected).faults) == {"tau"}
     calibration = summarize_replications(made, expected, truths=("mu 0.1",))
     assert calibration.is_calibrated
-    text = calibration_text(calibration)
+    text = str(calibration)
     assert "true values were stated (mu 0.1), the others drawn from the priors" in " ".join(text.split())
     assert "(tau)" in text
     wrong = [Replication(i, {}, (), {"mu": ranked(0.999)}, 0.1) for i in range(200)]

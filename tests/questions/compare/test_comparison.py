@@ -29,7 +29,7 @@ from bowdenfit.questions.compare import comparison_figure
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import CommonReadings, OmittedReadings, match_events
 from bowdenfit.questions.compare.verb import VERB
-from bowdenfit.questions.compare.words import comparison_page, comparison_text
+from bowdenfit.questions.compare.words import comparison_page
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, NOT_DESCRIBED
 from bowdenfit.questions.writing import write_answer
 
@@ -243,7 +243,7 @@ def by_hand(pointwise, how=("importance sampling",) * 6):
 
 def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     def words(*args):
-        return " ".join(comparison_text(by_hand(*args)).split())
+        return " ".join(str(by_hand(*args)).split())
 
     assert "The data prefer good over poor (score less by 12.1 ± 0.2)." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     assert "With 6 readings the standard errors tend to be too small." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
@@ -300,7 +300,7 @@ def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
 def test_one_reading_that_makes_most_of_a_difference_is_named():
     comparison = by_hand([9.0, 1.0, 1.1, 0.9, 1.0, 1.2])
     comparison = replace(comparison, differences=comparison.differences | {"poor": ElpdDifference(14.2, 2.0, 0)})
-    assert "Most of it comes from one reading, efficiency 400 mm (+9.0)." in " ".join(comparison_text(comparison).split())
+    assert "Most of it comes from one reading, efficiency 400 mm (+9.0)." in " ".join(str(comparison).split())
 
 
 @pytest.fixture(scope="module")
@@ -334,7 +334,7 @@ def test_run_effects_that_are_there_are_preferred_to_none(by_run_effect):
     assert comparison.best == "with"
     assert comparison.weights["with"] > 0.45
     assert sum(comparison.weights.values()) == pytest.approx(1.0)
-    text = " ".join(comparison_text(comparison).split())
+    text = " ".join(str(comparison).split())
     assert "capstan, no run effect" in text
     assert "(score less by" in text
     assert "A run of forces counts as one reading" in text
@@ -347,7 +347,7 @@ def test_fits_that_differ_in_a_prior_alone_are_said_to(by_run_effect, mountings)
     comparison = bf.compare(fits)
     (other,) = comparison.other_priors
     assert comparison.other_priors[other] == ("mu_edge",)
-    text = " ".join(comparison_text(comparison).split())
+    text = " ".join(str(comparison).split())
     assert f"{other} differs from {comparison.best} only in the prior of mu_edge" in text
     assert "Prefer the simpler one" not in text
     assert bf.compare(by_run_effect).other_priors == {}

@@ -19,7 +19,6 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.run_parts import split_runs
 from bowdenfit.kinds.runs import sum_runs
 from bowdenfit.models import build_model
-from bowdenfit.questions.compare.words import comparison_text
 
 pytestmark = pytest.mark.extended
 
@@ -83,7 +82,7 @@ def test_with_one_run_its_loads_are_left_out_and_the_right_model_is_preferred(on
     comparison = bf.compare(one_run)
     assert comparison.best == "drag" and comparison.verdict("capstan") == "clear"
     assert comparison.left_out == "load" and len(comparison.readings) == 16
-    text = " ".join(comparison_text(comparison).split())
+    text = " ".join(str(comparison).split())
     assert "there is one run" in text and "The data prefer drag over capstan" in text
     assert "inf" not in text.replace("inform", "")
 

@@ -5,10 +5,11 @@ import pytest
 from hand_bench import pull, write
 
 import bowdenfit as bf
+from bowdenfit.display import render_text
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.next.candidates import describe_candidate, format_candidate, parse_candidates
 from bowdenfit.questions.next.ranking import rank_measurements
-from bowdenfit.questions.next.words import next_measurement_text
+from bowdenfit.questions.next.words import ranking_blocks
 
 pytestmark = pytest.mark.extended
 
@@ -39,7 +40,7 @@ def test_a_hidden_tension_is_told_by_the_lowest_load(advice):
 
 @pytest.mark.slow
 def test_the_advice_says_which_load_and_stroke(fit, advice):
-    text = " ".join(next_measurement_text(advice, 5).split())
+    text = " ".join(render_text(ranking_blocks(advice, 5)).split())
     assert "That is a run like those made so far: 6 readings at" in text and "pulling and returning" in text and "64 N" in text
     assert bf.next_measurement(fit, "drag", ["force@180deg,4N,pull"]).within is None
 

@@ -19,6 +19,7 @@ from terminal_pages import faults
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
+from bowdenfit.display import render_text
 from bowdenfit.errors import UsageError
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
@@ -41,7 +42,7 @@ from bowdenfit.questions.next.variance_reduction import (
     simulate_readings,
     widths_after_outcomes,
 )
-from bowdenfit.questions.next.words import format_width, next_measurement_text
+from bowdenfit.questions.next.words import format_width, ranking_blocks
 from bowdenfit.questions.simulate.tables import empty_tables
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import Draws, Provenance
@@ -299,7 +300,7 @@ def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
     ranking = rank_measurements(fit)
     assert ranking.answer.name == "mu"
     assert ranking.best.name == "force@180deg"  # the same error of the exponent is least of the largest angle
-    assert "wrap angles in the columns" not in next_measurement_text(ranking, 5)
+    assert "wrap angles in the columns" not in render_text(ranking_blocks(ranking, 5))
 
 
 def test_elastic_cables_have_stretch_preload_and_loop_readings():
@@ -429,7 +430,7 @@ def test_the_ranking_is_in_order_and_says_what_is_as_good(for_length):
     assert for_length.ranked[0].as_good
     assert not for_length.ranked[-1].as_good
     alike = [r for r in for_length.ranked[1:] if r.as_good]
-    assert ("would do equally well" in next_measurement_text(for_length, 3)) == bool(alike)
+    assert ("would do equally well" in render_text(ranking_blocks(for_length, 3))) == bool(alike)
 
 
 def test_costs_change_the_ranking_but_do_not_bring_up_what_does_nothing(fit):
@@ -438,7 +439,7 @@ def test_costs_change_the_ranking_but_do_not_bring_up_what_does_nothing(fit):
     assert ranking.best.name == "efficiency@430"
     assert ranking.ranked[-1].name == "angle@470"
     assert ranking.best.worth == pytest.approx(ranking.best.share / 5)
-    assert "for its cost" in next_measurement_text(ranking, 5)
+    assert "for its cost" in render_text(ranking_blocks(ranking, 5))
 
 
 @pytest.mark.parametrize(
@@ -468,13 +469,13 @@ def test_answers_that_there_are_not_are_refused(fit, wanted, sentence):
 
 
 def test_where_nothing_helps_that_is_what_is_said(fit):
-    text = next_measurement_text(rank_measurements(fit, None, ["angle@470"]), 5)
+    text = render_text(ranking_blocks(rank_measurements(fit, None, ["angle@470"]), 5))
     assert text.startswith("None of these measurements would narrow the best cable length noticeably")
     assert "--candidate" in text
 
 
 def test_the_advice_comes_first_and_in_one_sentence(for_length):
-    first = " ".join(next_measurement_text(for_length, 4).split("\n\n", maxsplit=1)[0].split())
+    first = " ".join(render_text(ranking_blocks(for_length, 4)).split("\n\n", maxsplit=1)[0].split())
     best, answer = for_length.best, for_length.answer
     assert first.startswith(
         f"Measure {best.words} next, after remounting the cable. That would narrow the best cable length from ± "
@@ -482,7 +483,7 @@ def test_the_advice_comes_first_and_in_one_sentence(for_length):
     )
     assert "You may stop: any cable length from 4" in first
     assert "After it, " in first
-    page = next_measurement_text(for_length, 30)
+    page = render_text(ranking_blocks(for_length, 30))
     assert not [fault for fault in faults(page, lines=60) if "no answer" not in fault]
 
 
@@ -619,7 +620,7 @@ def test_a_fit_of_one_mounting_is_told_to_mount_the_cable_anew(tmp_path, runs):
     fit = bf.fit(tmp_path / "table.csv", wrap_angle="180deg", seed=1)
     ranking = bf.next_measurement(fit)
     second = ranking.second_mounting
-    text = " ".join(next_measurement_text(ranking).split())
+    text = " ".join(str(ranking).split())
     if runs == 1:
         assert second is not None
         assert second.low < second.width < second.high

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.display import render_text
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import curve_function, for_each_draw
-from bowdenfit.questions.predict.predictions import predictions_text
+from bowdenfit.questions.predict.predictions import prediction_blocks
 from bowdenfit.results import prediction_angles
 
 EDGE, FREE = "bracket edge", "free sheath"
@@ -129,8 +130,8 @@ def test_where_no_angle_was_measured_outside_the_curves_a_prediction_is_refused(
 
 def test_a_dynamic_range_is_a_ratio_without_a_unit():
     row = {"wrap_angle_deg": 90.0, "dynamic_range": 55.5, "mean": 55.4, "sd": 1.0, "q05": 54.1, "q95": 56.9, "note": ""}
-    assert predictions_text([row]) == "Dynamic range at 90 deg: 55.5 (90 % interval 54.1 to 56.9).\n"
-    several = predictions_text([row, row | {"wrap_angle_deg": 180.0, "dynamic_range": 30.2}])
+    assert render_text(prediction_blocks([row])) == "Dynamic range at 90 deg: 55.5 (90 % interval 54.1 to 56.9).\n"
+    several = render_text(prediction_blocks([row, row | {"wrap_angle_deg": 180.0, "dynamic_range": 30.2}]))
     assert "Dynamic range: highest 55.5 at 90 deg, lowest 30.2 at 180 deg." in " ".join(several.split())
     assert several.split("\n\n")[1].splitlines()[0].split() == ["wrap", "angle", "(deg)", "dynamic", "range"]
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 
 NONE, KARNOPP, ACTIVE = "none", "karnopp", "active"
@@ -13,8 +13,8 @@ ROPE_DAMPING = "the damping of the rope"
 """The input that usually determines the largest gain, and that a ring-down measures."""
 
 
-@dataclass(frozen=True, repr=False)
-class FeedForward(Part):
+@dataclass(frozen=True)
+class FeedForward:
     """Torque F_cst that is fed forward, constant or scheduled by bend.
 
     Args:
@@ -32,8 +32,8 @@ class FeedForward(Part):
     decided_at: float
 
 
-@dataclass(frozen=True, repr=False)
-class BendCompensation(Part):
+@dataclass(frozen=True)
+class BendCompensation:
     """Friction and compensation at one wrap angle.
 
     Args:
@@ -50,8 +50,8 @@ class BendCompensation(Part):
     left_fixed: float
 
 
-@dataclass(frozen=True, repr=False)
-class FeedbackGain(Part):
+@dataclass(frozen=True)
+class FeedbackGain:
     """Gain K_f on the torque measured at the joint.
 
     Args:
@@ -77,8 +77,8 @@ class FeedbackGain(Part):
     integral: float = 0.0
 
 
-@dataclass(frozen=True, repr=False)
-class PreloadOption(Part):
+@dataclass(frozen=True)
+class PreloadOption:
     """Effect of another preload.
 
     Args:
@@ -94,8 +94,8 @@ class PreloadOption(Part):
     JSON: ClassVar = ("preload", ("felt", "friction"), "slack_from")
 
 
-@dataclass(frozen=True, repr=False)
-class TorqueTrace(Part):
+@dataclass(frozen=True)
+class TorqueTrace:
     """Torques of the device with median friction, while a hand moves it to and fro.
 
     Args:
@@ -108,8 +108,8 @@ class TorqueTrace(Part):
     joint: np.ndarray
 
 
-@dataclass(frozen=True, repr=False)
-class SimulatedLaw(Part):
+@dataclass(frozen=True)
+class SimulatedLaw:
     """One control law, in every simulated device.
 
     Args:
@@ -127,8 +127,8 @@ class SimulatedLaw(Part):
     JSON: ClassVar = ("name", ("felt", "mean_torque"), ("peak", "peak_torque"), "trace")
 
 
-@dataclass(frozen=True, repr=False)
-class DeviceSimulation(Part):
+@dataclass(frozen=True)
+class DeviceSimulation:
     """Simulation of the compensated device.
 
     Args:

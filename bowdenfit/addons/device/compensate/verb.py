@@ -66,7 +66,7 @@ def _write(answer: "Compensation", folder: Path, cable: str) -> None:
     figures = {NAME: _compensate.compensation_figure}
     if answer.simulated is not None:
         figures[TRACES] = _compensate.compensation_traces_figure
-    write_answer(folder, NAME, answer, _compensate.compensation_text(answer), figures, cable)
+    write_answer(folder, NAME, answer, f"{answer}\n", figures, cable)
 
 
 def _reply(answer: "Compensation", options: dict[str, Any]) -> Reply:
@@ -74,7 +74,7 @@ def _reply(answer: "Compensation", options: dict[str, Any]) -> Reply:
     if files and answer.simulated is not None:
         files += answer_figures(options["output"], TRACES)
     notes = tuple(f"Wrote {path}." for path in files)
-    return Reply(_compensate.compensation_text(answer), lambda: answer, notes, csv=answer.to_csv)
+    return Reply(f"{answer}\n", lambda: answer, notes, csv=answer.to_csv)
 
 
 COMPENSATE = Verb(

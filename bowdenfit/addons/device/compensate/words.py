@@ -11,8 +11,8 @@ from bowdenfit.addons.device.compensate.answer import (
     FeedbackGain,
     FeedForward,
 )
-from bowdenfit.display import text_of
-from bowdenfit.words import decimals, filled, listed, percent, table
+from bowdenfit.display import Block, ResultTable, blocks_of, separate
+from bowdenfit.words import decimals, listed, percent
 
 _ROWS = 3  # of the bends in the table; a judgement
 _LAWS = {NONE: "without compensation", KARNOPP: "with feed-forward", ACTIVE: "with feedback"}
@@ -20,13 +20,10 @@ _WORTHWHILE = 1.2  # times better, from which on a schedule is worth its trouble
 _LIKELY_SLACK = 0.005  # probability that rounds to 1 %
 
 
-@text_of.register(Compensation)
-def compensation_text(answer: Compensation) -> str:
+@blocks_of.register(Compensation)
+def compensation_blocks(answer: Compensation) -> list[Block]:
     """Return the answer for people, the answer first, in at most 25 lines."""
-    blocks = ["\n".join(filled(line) for line in sentences(answer)), _bend_table(answer)]
-    if answer.simulated is not None:
-        blocks.append("\n".join(filled(line) for line in _simulation_sentences(answer)))
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return separate(sentences(answer), _bend_table(answer), _simulation_sentences(answer))
 
 
 def sentences(answer: Compensation) -> list[str]:
@@ -185,17 +182,17 @@ def _missing_sentences(answer: Compensation) -> Iterator[str]:
         yield f"How much of the measured torque may be fed back cannot be estimated, because {where} [section], key: {keys}."
 
 
-def _bend_table(answer: Compensation) -> str:
-    """Return some bends as a table."""
+def _bend_table(answer: Compensation) -> list[Block]:
+    """Return some bends as a table; empty where there is nothing to list."""
     if answer.scheduled is None or len(answer.by_bend) == 1:
-        return ""
+        return []
     rows = []
     last = len(answer.by_bend) - 1
     for i in range(_ROWS):
         bend = answer.by_bend[round(i * last / (_ROWS - 1))]
         friction = f"{bend.friction.median:.3f} ({bend.friction.q05:.3f} to {bend.friction.q95:.3f})"
         rows.append([f"{bend.wrap_angle:.4g}", friction, f"{bend.scheduled:.3f}", f"{bend.left_scheduled:.3f}"])
-    return table(["bend (deg)", "friction (N m)", "fed forward (N m)", "remaining (N m)"], rows)
+    return [ResultTable(["bend (deg)", "friction (N m)", "fed forward (N m)", "remaining (N m)"], rows)]
 
 
 def _simulation_sentences(answer: Compensation) -> Iterator[str]:

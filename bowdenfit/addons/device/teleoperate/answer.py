@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows, text_of
+from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import filled, listed, percent, significant, table
+from bowdenfit.words import listed, percent, significant
 
 
-@dataclass(frozen=True, repr=False)
-class CouplingScheme(Part):
+@dataclass(frozen=True)
+class CouplingScheme:
     """One coupling of master and slave.
 
     Args:
@@ -48,8 +48,8 @@ class CouplingScheme(Part):
     )
 
 
-@dataclass(frozen=True, repr=False)
-class SimulatedContact(Part):
+@dataclass(frozen=True)
+class SimulatedContact:
     """One simulated device: in free motion for 2 s, then against the wall, as in figures 12 to 14 of the haptic paper.
 
     Args:
@@ -120,11 +120,10 @@ class Teleoperation(Display):
         return rows, {"wall_stiffness": "N*m/rad"}
 
 
-@text_of.register(Teleoperation)
-def teleoperation_text(answer: Teleoperation) -> str:
+@blocks_of.register
+def _(answer: Teleoperation) -> list[Block]:
     """Return the answer for people, the answer first, in at most 25 lines."""
-    lines = "\n".join(filled(line) for line in sentences(answer))
-    return f"{lines}\n\n{_scheme_table(answer)}\n"
+    return separate(sentences(answer), [_scheme_table(answer)])
 
 
 def sentences(answer: Teleoperation) -> list[str]:
@@ -221,7 +220,7 @@ def _describe_quiet(answer: Teleoperation, quiet: Sequence[str]) -> str:
     return "with every coupling" if len(quiet) == len(answer.schemes) else f"with {listed(quiet)}"
 
 
-def _scheme_table(answer: Teleoperation) -> str:
+def _scheme_table(answer: Teleoperation) -> ResultTable:
     rows = [
         [
             scheme.name,
@@ -233,7 +232,7 @@ def _scheme_table(answer: Teleoperation) -> str:
         for scheme in answer.schemes
     ]
     heads = ["coupling", "free (N*m)", "wall felt (N*m/rad)", "hardest: linear", "simulated"]
-    return table(heads, rows)
+    return ResultTable(heads, rows)
 
 
 def _format_simulated(answer: Teleoperation, scheme: CouplingScheme) -> str:

@@ -44,7 +44,7 @@ def teleoperate(
     """
     answer = _teleoperate.assess_teleoperation(fit.with_seed(seed), Path(device), wrap_angle, PROBABILITY)
     if output is not None:
-        text = _teleoperate.teleoperation_text(answer)
+        text = f"{answer}\n"
         write_answer(output, NAME, answer, text, {NAME: _teleoperate.teleoperation_figure}, fit.name)
     return answer
 
@@ -53,7 +53,7 @@ def _reply(answer: "Teleoperation", options: dict[str, Any]) -> Reply:
 
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
     exit_code = NOT_TRUSTED if answer.contradicted else 0
-    return Reply(_teleoperate.teleoperation_text(answer), lambda: answer, notes, exit_code, csv=answer.to_csv)
+    return Reply(f"{answer}\n", lambda: answer, notes, exit_code, csv=answer.to_csv)
 
 
 TELEOPERATE = Verb(

@@ -1,3 +1,2 @@
 from .figures import write_pool as write_pool
 from .pooling import pool_results as pool_results
-from .words import pool_text as pool_text

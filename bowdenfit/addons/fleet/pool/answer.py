@@ -5,12 +5,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows
+from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 
 
-@dataclass(frozen=True, repr=False)
-class ServiceLimit(Part):
+@dataclass(frozen=True)
+class ServiceLimit:
     """Efficiency until which a cable serves, and the wrap angles at which that holds.
 
     Args:
@@ -24,8 +24,8 @@ class ServiceLimit(Part):
     cycles: float | None
 
 
-@dataclass(frozen=True, repr=False)
-class Life(Part):
+@dataclass(frozen=True)
+class Life:
     """Cycles until the efficiency falls below the limit, dry and at the reference temperature.
 
     Args:
@@ -43,8 +43,8 @@ class Life(Part):
     extrapolated: bool
 
 
-@dataclass(frozen=True, repr=False)
-class PooledCable(Part):
+@dataclass(frozen=True)
+class PooledCable:
     """One cable, shrunk toward the population as far as its data allow, or an outlier by its own inspections alone.
 
     Args:
@@ -82,8 +82,8 @@ class PooledCable(Part):
     )  # fmt: skip
 
 
-@dataclass(frozen=True, repr=False)
-class Effect(Part):
+@dataclass(frozen=True)
+class Effect:
     """Relative change of friction by wear or a covariate.
 
     Args:
@@ -97,8 +97,8 @@ class Effect(Part):
     probability: float
 
 
-@dataclass(frozen=True, repr=False)
-class NextInspection(Part):
+@dataclass(frozen=True)
+class NextInspection:
     """A next inspection and how much it would reduce uncertainty.
 
     Args:
@@ -118,8 +118,8 @@ class NextInspection(Part):
     probability: float | None
 
 
-@dataclass(frozen=True, repr=False)
-class Curves(Part):
+@dataclass(frozen=True)
+class Curves:
     """Curves over cycles, dry and at the reference temperature.
 
     Args:
@@ -137,8 +137,8 @@ class Curves(Part):
     fails: np.ndarray | None
 
 
-@dataclass(frozen=True, repr=False)
-class ExcludedFit(Part):
+@dataclass(frozen=True)
+class ExcludedFit:
     """An inspection that is not pooled.
 
     Args:

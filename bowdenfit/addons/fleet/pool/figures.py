@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.addons.fleet.pool.words import HEADINGS, pool_page, pool_text
+from bowdenfit.addons.fleet.pool.words import HEADINGS, pool_page
 from bowdenfit.outputs import write_text
 from bowdenfit.plots.layout import (
     LEFT,
@@ -207,5 +207,5 @@ def write_pool(pool: Pool, folder: Path, name: str) -> None:
         for figure_name, figure in draw_figures(pool).items():
             write_all(figure, place, figure_name)
         write_page(pool_page(pool), place, place / f"{name}.html")
-        write_text(place / f"{name}.txt", printable(pool_text(pool)))
+        write_text(place / f"{name}.txt", printable(f"{pool}\n"))
         write_text(place / f"{name}.json", json.dumps(plain_data(pool), indent=1, allow_nan=False) + "\n")

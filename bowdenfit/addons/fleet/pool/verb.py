@@ -73,7 +73,7 @@ def pool(
 
 def _reply(answer: "Pool", options: dict[str, Any]) -> Reply:
     notes = (f"Wrote {options['output']}.",) if options["output"] else ()
-    return Reply(_pool.pool_text(answer), lambda: answer, notes, 0 if answer.is_trusted else NOT_TRUSTED, answer.to_csv)
+    return Reply(f"{answer}\n", lambda: answer, notes, 0 if answer.is_trusted else NOT_TRUSTED, answer.to_csv)
 
 
 POOL = Verb(

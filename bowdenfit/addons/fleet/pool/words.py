@@ -3,10 +3,10 @@
 import math
 
 from bowdenfit.addons.fleet.pool.answer import Effect, Life, Pool, PooledCable
-from bowdenfit.display import text_of
+from bowdenfit.display import Block, ResultTable, blocks_of, separate
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import HtmlPage, PageTable, Picture, prose_section
-from bowdenfit.words import counted, decimals, few, filled, listed, percent, table
+from bowdenfit.words import counted, decimals, few, listed, percent
 
 HEADINGS = {
     "pooled-coefficients": "Cables shrunk toward the population",
@@ -19,19 +19,19 @@ _INDISTINGUISHABLE = 0.1  # 5 % of a spread over its 95 %, below which it cannot
 _UNRELATED = 5.0  # 95 % of new cables over their 5 %, above which one cable tells little of another; a judgement
 
 
-@text_of.register(Pool)
-def pool_text(pool: Pool) -> str:
+@blocks_of.register(Pool)
+def pool_blocks(pool: Pool) -> list[Block]:
     """Return a pooled fleet for people: life or wear first, then who is unlike, what to inspect, and the numbers."""
-    blocks = [
-        filled(headline(pool)),
-        "\n".join(filled(line) for line in (*trust_sentences(pool), *life_sentences(pool), *outlier_sentences(pool))),
-        "\n".join(filled(line) for line in next_sentences(pool)),
-        "\n".join(filled(line) for line in effect_sentences(pool)),
-        table(*population_rows(pool)) + "\n\n" + filled(explain_columns(pool)),
+    return separate(
+        [headline(pool)],
+        [*trust_sentences(pool), *life_sentences(pool), *outlier_sentences(pool)],
+        next_sentences(pool),
+        effect_sentences(pool),
+        [ResultTable(*population_rows(pool))],
+        [explain_columns(pool)],
         _cable_table(pool),
-        "\n".join(filled(line) for line in pool.notes),
-    ]
-    return "\n\n".join(block for block in blocks if block.strip()) + "\n"
+        pool.notes,
+    )
 
 
 def headline(pool: Pool) -> str:
@@ -222,13 +222,13 @@ def cable_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     return tuple(heads), rows
 
 
-def _cable_table(pool: Pool) -> str:
+def _cable_table(pool: Pool) -> list[Block]:
     """Return the cables that matter most in a table."""
     heads, rows = cable_rows(pool)
     order = sorted(range(len(rows)), key=lambda i: _rank_importance(pool.cables[i]))
     shown = sorted(order[:_SHOWN])
-    more = f"\n... and {len(rows) - len(shown)} more; --csv and --json have all" if len(shown) < len(rows) else ""
-    return table(heads, [rows[i] for i in shown], left=("",)) + more
+    more = f"... and {len(rows) - len(shown)} more; --csv and --json have all" if len(shown) < len(rows) else ""
+    return [ResultTable(heads, [rows[i] for i in shown], left=("",)), more]
 
 
 def _rank_importance(cable: PooledCable) -> tuple[float, float]:

@@ -49,7 +49,7 @@ def bent(z):
 
 def test_bent_target_is_drawn_as_it_is():
     mean_square = 2.0**2 + 0.3**2
-    known = {"along": 2.0, "bent": mean_square / 2, "far": -3.0}
+    expected = {"along": 2.0, "bent": mean_square / 2, "far": -3.0}
     tails = {"along": stats.norm(2, 0.3), "far": stats.t(5, -3)}
     limit = stats.norm.isf(FAILURE_RATE / 2 / (SEEDS * 3))
     below = {name: [] for name in tails}
@@ -59,7 +59,7 @@ def test_bent_target_is_drawn_as_it_is():
         assert chain.z.shape == (4, 500, 3)
         for i, name in enumerate(NAMES):
             error = np.hypot(chain.diagnostics[name].mcse_mean, chain.z[..., i].std() / np.sqrt(chain.z[..., i].size))
-            assert abs(chain.z[..., i].mean() - known[name]) < limit * error, name
+            assert abs(chain.z[..., i].mean() - expected[name]) < limit * error, name
         for name, distribution in tails.items():
             below[name].append(np.mean(chain.z[..., NAMES.index(name)] < distribution.ppf(0.05)))
     for shares in below.values():  # at least 1000 effective draws of each seed
@@ -111,8 +111,8 @@ def write_creeping_bench(folder):
     folder.mkdir()
     generator, time = np.random.default_rng(2), np.arange(0, 11, 0.01)
 
-    def motion(at):
-        return pulled(at, periods=(2.5, 1.75, 1.25))
+    def motion(instants):
+        return pulled(instants, periods=(2.5, 1.75, 1.25))
 
     force, speed = motion(time)
     output = creep(Truth(0.3, 25.0), time, motion)

@@ -4,7 +4,7 @@ Only NumPy types live here, so that reading and checking tables never waits for 
 write `Float[Array, "..."]` themselves. `Other...` and `Chosen...` are for functions that take arrays of several lengths.
 """
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -19,3 +19,5 @@ OtherLabels: TypeAlias = Int[np.ndarray, " other"]
 ChosenVector: TypeAlias = Float[np.ndarray, " chosen"]
 ChosenFlags: TypeAlias = Bool[np.ndarray, " chosen"]
 Positions: TypeAlias = Int[np.ndarray, " chosen"]
+# Array of a term's data: NumPy's or JAX's, or what stands in its place while JAX handles the data as a tree.
+DataArray: TypeAlias = Any

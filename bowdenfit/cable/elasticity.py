@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -22,11 +23,30 @@ from bowdenfit.physics.stretch import (
     preload_at,
     tension_from_extension,
 )
+from bowdenfit.types import DataArray
 
 STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD = "stiffness", "bedding_stretch", "bedding_load"
 LENGTHENING, PRELOAD, STRETCH_ZERO, STRETCH_FRICTION = "lengthening", "preload", "stretch_zero", "mu_stretch"
 
 Values = Mapping[str, Array]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class StretchRows:
+    """Loads and wrap angles of the rows of a table of stretch.
+
+    Args:
+        load: Load of each row [N], (rows).
+        peak: Largest load before it [N], (rows).
+        wrap_angles: The different wrap angles [rad], (angles).
+        spread: Matrix that gives each row its own, (angles, rows).
+    """
+
+    load: DataArray
+    peak: DataArray
+    wrap_angles: DataArray
+    spread: DataArray
 
 
 @dataclass(frozen=True)
@@ -84,19 +104,19 @@ class Elasticity:
         mean = mean_tension_unloading(load, peak, self.friction_exponent(values, wrap_angle))
         return self.extension(values, mean) + values[LENGTHENING] * wrap_angle - values[STRETCH_ZERO]
 
-    def stretch_of_rows(self, values: Values, rows: Mapping[str, Array]) -> Float[Array, " rows"]:
+    def stretch_of_rows(self, values: Values, rows: StretchRows) -> Float[Array, " rows"]:
         """Return the same for the rows of a table, friction worked out once for every different wrap angle [mm].
 
         Args:
             values: Values of the parameters.
-            rows: Loads, their peaks, the different wrap angles, and the matrix that gives each row its own.
+            rows: Loads and wrap angles.
         """
-        exponent, spread = self.friction_exponent(values, rows["wrap_angles"]), rows["spread"]
+        exponent, spread = self.friction_exponent(values, rows.wrap_angles), rows.spread
         unit = jnp.ones_like(exponent)
-        lengthened = values[LENGTHENING] * rows["wrap_angles"] - values[STRETCH_ZERO]
+        lengthened = values[LENGTHENING] * rows.wrap_angles - values[STRETCH_ZERO]
         of_angle = jnp.stack([exponent, mean_tension(unit, exponent), mean_tension(unit, -exponent), lengthened])
         exponents, loading, unloading, lengthened = of_angle @ spread
-        mean = mean_tension_from_shares(rows["load"], rows["peak"], exponents, loading, unloading)
+        mean = mean_tension_from_shares(rows.load, rows.peak, exponents, loading, unloading)
         return self.extension(values, mean) + lengthened
 
     def preload(

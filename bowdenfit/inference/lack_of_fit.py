@@ -30,6 +30,7 @@ from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, explain_residuals, group_residuals
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.kinds.plausibility import MOST_LEVELS
+from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import Model
@@ -149,12 +150,12 @@ def _assess_drift(basin: Basin, reach: Mapping[str, float], system: ResidualGrou
     )
 
 
-def _subtract_drift(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any]:
+def _subtract_drift(term: Any, data: RunsData, more: np.ndarray) -> RunsData:
     """Return data of runs with a correction subtracted from each log ratio inside them."""
     cell, weight = term.inside.cell, term.inside.weight
-    n = len(data["mean"])
+    n = len(data.cells.mean)
     mean = np.bincount(cell, weight * more, n) / np.maximum(np.bincount(cell, weight, n), 1e-300)
-    return data | {"mean": data["mean"] - mean}
+    return replace(data, cells=replace(data.cells, mean=data.cells.mean - mean))
 
 
 def _find_far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:

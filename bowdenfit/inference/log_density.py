@@ -10,7 +10,6 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.kinds.term import COUNTS
 from bowdenfit.models import Model
 
 
@@ -37,12 +36,12 @@ class LogDensity:
             )
 
     @cached_property
-    def data(self) -> tuple[dict[str, Any], ...]:
+    def data(self) -> tuple[Any, ...]:
         """Data of all terms, in their order."""
         return tuple(term.data for term in self.model.terms) if self.data_override is None else self.data_override
 
     @cached_property
-    def padded(self) -> tuple[dict[str, Any], ...]:
+    def padded(self) -> tuple[Any, ...]:
         """Data padded to shapes that hardly depend on the number of readings, so that one program serves many tables.
 
         The log density is the same to rounding; single readings and residuals stand at other positions.
@@ -50,7 +49,7 @@ class LogDensity:
         return tuple(getattr(term, "padded", term.data) for term in self.model.terms)
 
     @cached_property
-    def with_spare_rows(self) -> tuple[dict[str, Any], ...]:
+    def with_spare_rows(self) -> tuple[Any, ...]:
         """Padded data with room for more mountings, so that one program serves a table that grows.
 
         The log density is the same to rounding: copies of readings fill the room, and do not count.
@@ -83,6 +82,7 @@ class LogDensity:
         return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=False)}
 
 
-def _counted(likelihood: Array, term: Mapping[str, Any]) -> Array:
+def _counted(likelihood: Array, data: Any) -> Array:
     """Return the log likelihoods of a term's readings, 0 of those that do not count."""
-    return jnp.where(term[COUNTS], likelihood, 0.0) if COUNTS in term else likelihood
+    counts = getattr(data, "counts", None)
+    return likelihood if counts is None else jnp.where(counts, likelihood, 0.0)

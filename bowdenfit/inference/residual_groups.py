@@ -257,7 +257,7 @@ def _inside_run_block(
 ) -> ResidualGroup:
     """Return readings inside runs: each residual is that of its cell plus its deviation from the cell."""
     noise, root = float(values[term.reading_noise]), np.sqrt(inside.weight)
-    share = root / np.sqrt(np.maximum(term.data["weight"][inside.cell], 1e-300))
+    share = root / np.sqrt(np.maximum(term.data.cells.weight[inside.cell], 1e-300))
     runs = inside.run[:, None] == np.unique(inside.run)[None, :]
     mean = np.bincount(inside.run, inside.weight * inside.log_ratio) / np.bincount(inside.run, inside.weight)
     n = len(root)

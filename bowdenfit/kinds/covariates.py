@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.kinds import find_kind
+from bowdenfit.kinds.angles.term import AnglesData
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.sliding_rows import STROKE as STROKE
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.kinds.term import WRAP_ANGLE, Term
+from bowdenfit.kinds.term import WRAP_ANGLE, Term, find_row_angles
 from bowdenfit.kinds.terms import find_term_kind
 
 RUN = "Run"
@@ -76,14 +76,14 @@ def _covariates_of_kind(
 def _mean_wrap_angles(term: Term) -> np.ndarray | None:
     """Return the total measured wrap angle of each reading or run [deg]; None where curves give it, or a run has several."""
     rows = getattr(term, "rows", None)
-    at = term.data if rows is None else rows.angles
-    if "is_own" not in at:
+    angles = find_row_angles(term.data) if rows is None else rows.angles
+    if angles is None:
         return None
-    own_angles, n = np.asarray(at["is_own"]), len(term.labels)
+    own_angles, n = np.asarray(angles.is_own), len(term.labels)
     curved = [bool(contact.wrap_angle.curve) for contact in term.cable.description.contact]
     if own_angles.shape[1:] != (len(curved),) or not own_angles.any() or not own_angles[:, curved].all():
         return None
-    bends = np.rad2deg(np.sum(np.where(own_angles, at["own"], 0.0), axis=1))
+    bends = np.rad2deg(np.sum(np.where(own_angles, angles.own, 0.0), axis=1))
     if rows is not None:
         angles_of_runs = [bends[rows.run == run] for run in np.unique(rows.run)]
         if any(np.ptp(of_run) > _ONE_PLACE * np.ptp(bends) for of_run in angles_of_runs):
@@ -95,26 +95,22 @@ def _mean_wrap_angles(term: Term) -> np.ndarray | None:
 def route_values(term: Term) -> np.ndarray | None:
     """Return the route value of each reading or run; NaN for a run that was read at several."""
     data, n = term.data, len(term.labels)
-    at = data.get("route")
-    if at is None:
+    if isinstance(data, AnglesData):
+        return np.concatenate([np.asarray(values, dtype=float) for values in data.route.values()])[data.order]
+    angles = find_row_angles(data)
+    if angles is None:
         return None
-    if isinstance(at, Mapping):
-        return _concatenate_curves(at)[data["order"]]
-    values = np.asarray(at, dtype=float)
-    if "run" not in data:
+    values, run_of_row = np.asarray(angles.route, dtype=float), getattr(getattr(data, "cells", data), "run", None)
+    if run_of_row is None:
         return values if len(values) == n else None
-    of_run = [values[data["run"] == run] for run in range(n)]
+    of_run = [values[run_of_row == run] for run in range(n)]
     return np.array([at_run.mean() if np.ptp(at_run) <= _ONE_PLACE * np.ptp(values) else np.nan for at_run in of_run])
-
-
-def _concatenate_curves(by_curve: Mapping[str, Any]) -> np.ndarray:
-    return np.concatenate([np.asarray(values, dtype=float) for values in by_curve.values()])
 
 
 def _columns_of_angles(term: Term) -> tuple[str, ...]:
     """Return the column of each angle reading; empty strings for other tables."""
-    at = term.data.get("route")
-    if not isinstance(at, Mapping):
+    data = term.data
+    if not isinstance(data, AnglesData):
         return ("",) * len(term.labels)
-    columns = [column for column, values in at.items() for _ in values]
-    return tuple(columns[i] for i in term.data["order"])
+    columns = [column for column, values in data.route.items() for _ in values]
+    return tuple(columns[i] for i in data.order)

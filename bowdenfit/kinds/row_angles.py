@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -12,39 +14,41 @@ from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.description import Description
 from bowdenfit.kinds.rows import ForceRows
 from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.types import DataArray
 
 ROUNDING = 1e-9  # share of a route value by which another may differ and be the same, above rounding of units
 
 
+@jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class RowAngles:
     """Wrap angle of each row of a table: the curve's, or its own measured one with its error.
 
     Args:
-        route: Route variable of each row; 0 without one.
-        own: Own angle of each row and contact [rad]; 0 without one.
-        is_own: Whether a row has an angle of its own there.
-        known_sd: Its stated standard deviation [rad]; 0 without one.
-        has_angle_noise: Whether the noise of the angle table applies to it.
+        route: Route variable of each row, (rows); 0 without one.
+        own: Own angle of each row and contact [rad], (rows, contacts); 0 without one.
+        is_own: Whether a row has an angle of its own there, (rows, contacts).
+        known_variance: Its stated variance [rad^2], (rows, contacts); 0 without one.
+        noisy: Whether the noise of the angle table applies to it, (rows, contacts).
+        group: Number of each row's group, (rows); 0 without groups.
     """
 
-    route: np.ndarray
-    own: np.ndarray
-    is_own: np.ndarray
-    known_sd: np.ndarray
-    has_angle_noise: np.ndarray
+    route: DataArray
+    own: DataArray
+    is_own: DataArray
+    known_variance: DataArray
+    noisy: DataArray
+    group: DataArray
 
     @property
-    def data(self) -> dict[str, np.ndarray]:
-        """The arrays as a dictionary, for jitted functions."""
-        return {
-            "route": self.route,
-            "own": self.own,
-            "is_own": self.is_own,
-            "known_variance": self.known_sd**2,
-            "noisy": self.has_angle_noise,
-            "group": np.zeros(len(self.route), dtype=int),  # a kind whose rows are of groups puts theirs in its place
-        }
+    def is_exact(self) -> bool:
+        """Whether no own angle has an error."""
+        return not (self.known_variance.any() or self.noisy.any())
+
+    def select(self, rows: Any) -> "RowAngles":
+        """Return the angles of some rows."""
+        angles: RowAngles = jax.tree.map(lambda values: values[rows], self)
+        return angles
 
 
 def collect_row_angles(description: Description, table: ForceRows, angles: AngleTable | None) -> RowAngles:
@@ -73,7 +77,7 @@ def collect_row_angles(description: Description, table: ForceRows, angles: Angle
         own[has, k], is_own[has, k] = angle[has], True
         sd[has, k] = np.nan_to_num(angle_sd[has])
         noisy[has, k] = np.isnan(angle_sd[has]) & bool(contact.wrap_angle.curve)
-    return RowAngles(np.nan_to_num(table.route), own, is_own, sd, noisy)
+    return RowAngles(np.nan_to_num(table.route), own, is_own, sd**2, noisy, np.zeros(n, dtype=int))
 
 
 def _complete_outside_curves(
@@ -107,11 +111,11 @@ def find_measured_angle(angles: AngleTable, column: str, at: float) -> tuple[flo
 
 
 def resolve_angles(
-    cable: Cable, values: Mapping[str, Array], rows: Mapping[str, Array]
+    cable: Cable, values: Mapping[str, Array], rows: RowAngles
 ) -> tuple[Float[Array, "rows contacts"], Float[Array, "rows contacts"]]:
     """Return wrap angle [rad] and its variance [rad^2] for each row and contact, at given parameters."""
-    angles = jnp.where(rows["is_own"], rows["own"], cable.wrap_angles(values, rows["route"]))
-    variance = rows["known_variance"]
+    angles = jnp.where(rows.is_own, rows.own, cable.wrap_angles(values, rows.route))
+    variance = rows.known_variance
     if ANGLE_NOISE in values:
-        variance = variance + jnp.where(rows["noisy"], values[ANGLE_NOISE] ** 2, 0.0)
+        variance = variance + jnp.where(rows.noisy, values[ANGLE_NOISE] ** 2, 0.0)
     return angles, jnp.asarray(variance)

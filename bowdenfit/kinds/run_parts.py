@@ -5,13 +5,13 @@ with all of them; the likelihood of a part, given the rest of its run, is the qu
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import jax
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.kinds.runs import RunsTerm, pad_cells, sum_runs
+from bowdenfit.kinds.runs import RunsData, RunsTerm, pad_cells, sum_runs
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.term import Term
 from bowdenfit.types import Labels
@@ -36,7 +36,7 @@ class RunParts:
     labels: tuple[str, ...]
     event_keys: np.ndarray
     run: Labels
-    data: dict[str, Any]
+    data: RunsData
 
 
 def has_rows(term: Term) -> bool:
@@ -67,7 +67,7 @@ def split_runs(term: Term, unit: LeaveOut) -> RunParts | None:
             f"{term.name} has {len(counts):,} parts, and at most {_MOST_PARTS} can be left out one by one; use --leave-out "
             f"{'load' if unit == 'reading' else 'run'}."
         )
-    cells_per_run = len(term.data["mean"]) // len(term.labels)
+    cells_per_run = len(term.data.cells.mean) // len(term.labels)
     left = [
         pad_cells(sum_runs(term.cable, _select_rows(term.rows, part != i)), len(term.labels), cells_per_run)
         for i in range(len(counts))
@@ -81,7 +81,7 @@ def _select_rows(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
     """Return the kept readings."""
     arrays = {name: value[kept] for name, value in vars(rows).items() if isinstance(value, np.ndarray)}
     unused = {heading: replace(column, numbers=column.numbers[kept]) for heading, column in rows.unused.items()}
-    return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()}, unused=unused)
+    return replace(rows, **arrays, angles=rows.angles.select(kept), unused=unused)
 
 
 def _assign_parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, tuple[str, ...]]:

@@ -19,12 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from bowdenfit.kinds.row_angles import RowAngles
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.types import Labels, Matrix, Vector
-
-ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy", "group")
-
 
 _FEWEST_TO_SHIFT = 3  # readings of a group from which its line need not go through the origin: one more than coefficients
 _FEWEST_TO_BEND = 6  # readings of a group from which a parabola is looked for; a judgement
@@ -49,7 +47,7 @@ class SlidingRows:
         velocity: Velocity; NaN where it is not known.
         drift: s d(log F_out)/dt, by which a delay of the output channel shifts the log ratio [1/s]; 0 without a clock.
         n_effective: How many independent readings each counts for [1].
-        angles: `ROW_ARRAYS` of every row.
+        angles: Wrap angles of every row.
         information: Information of one such reading on its log ratio at unit noise of the output cell [N^2]; computed from
             the forces if omitted.
         unused: Columns that the fit does not use, by heading.
@@ -63,7 +61,7 @@ class SlidingRows:
     velocity: Vector
     drift: Vector
     n_effective: Vector
-    angles: Mapping[str, np.ndarray]
+    angles: RowAngles
     information: Vector | None = None
     unused: Mapping[str, UnusedColumn] = field(default_factory=dict[str, UnusedColumn])
 
@@ -269,7 +267,7 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     first, last = np.full(int(run.max()) + 1, len(run)), np.zeros(int(run.max()) + 1, dtype=int)
     np.minimum.at(first, run, np.arange(len(run)))
     np.maximum.at(last, run, np.arange(len(run)))
-    own_angles = np.where(rows.angles["is_own"], rows.angles["own"], 0.0)
+    own_angles = np.where(rows.angles.is_own, rows.angles.own, 0.0)
     order = (np.arange(len(run)) - first[run]).astype(float)
     later = 2 * order / np.maximum(last - first, 1)[run] - 1
     drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}

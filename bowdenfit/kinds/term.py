@@ -27,13 +27,13 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.sensors import NoiseLaw, noise_law, scatter
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.candidate import CandidateKind
-from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import ForceRows, UnusedColumn
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 AnyTable = TypeVar("AnyTable")
-COUNTS = "counts"  # array of the data: which readings count in the log density; all where there is none
+Data = TypeVar("Data")
 _FEWEST_SPARE = 16  # rows for which a program with room for more is compiled at least; a judgement
 LOAD, WRAP_ANGLE, GROUP = "Load (N)", "Wrap angle (deg)", "Group"  # labels of covariates
 
@@ -53,8 +53,12 @@ class Term(Protocol):
         ...
 
     @property
-    def data(self) -> dict[str, Any]:
-        """Arrays that its functions take."""
+    def data(self) -> Any:
+        """Arrays that its functions take: a dataclass that JAX knows as a tree.
+
+        See `find_row_angles`. An array `counts` says which readings count in the log density; all
+        where there is none.
+        """
         ...
 
     @property
@@ -82,19 +86,19 @@ class Term(Protocol):
         """Its residuals by what makes them scatter, in order: how many there are, how many of them vary independently."""
         ...
 
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+    def log_likelihood(self, values: Mapping[str, Array], data: Any) -> Array:
         """Log likelihood of each reading."""
         ...
 
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+    def residuals(self, values: Mapping[str, Array], data: Any) -> Array:
         """Standardized residuals of the same likelihood."""
         ...
 
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Array:
+    def expected(self, values: Mapping[str, Array], data: Any) -> Array:
         """Expected readings in the term's unit."""
         ...
 
-    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Array:
+    def simulate(self, values: Mapping[str, Array], data: Any, key: Array) -> Array:
         """Readings drawn at given parameters, in the term's unit."""
         ...
 
@@ -155,8 +159,8 @@ class Truth:
 
     def wrap_angles(self, rows: ForceRows) -> tuple[Array, Array]:
         """Wrap angle [rad] of each row and contact without its error, and the error's variance [rad^2]."""
-        data = collect_row_angles(self.cable.description, rows, self.angles).data
-        return resolve_angles(self.cable, self.values, {name: jnp.asarray(array) for name, array in data.items()})
+        angles = collect_row_angles(self.cable.description, rows, self.angles)
+        return resolve_angles(self.cable, self.values, jax.tree.map(jnp.asarray, angles))
 
     def simulate(self, term: Any, key: Array) -> Array:
         """Return readings drawn from a term whose `simulate` takes a factor on its noise.
@@ -247,7 +251,8 @@ class TermKind(ABC, Generic[AnyTable]):
 
         Models can be compared only by how well they predict the same events.
         """
-        return np.column_stack([term.observed(), term.data["n"]] if "n" in term.data else [term.observed()])
+        n = getattr(term.data, "n", None)
+        return np.column_stack([term.observed()] if n is None else [term.observed(), n])
 
     def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
         """Return why readings of a name are not the same events under several descriptions, by the names of the fits."""
@@ -269,12 +274,12 @@ class IndependentReadings(ABC):
 
     Args:
         cable: The cable.
-        data: Arrays; "reading" holds the readings, and `expected` takes the others.
+        data: Arrays; `reading` holds the readings, and `expected` takes the others.
         labels: Each reading in words.
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: Any = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
 
     @property
@@ -293,7 +298,7 @@ class IndependentReadings(ABC):
         """Parameter that is the standard deviation of a reading."""
 
     @abstractmethod
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def expected(self, values: Mapping[str, Array], data: Any) -> Float[Array, " rows"]:
         """Expected readings in the term's unit."""
 
     @property
@@ -301,18 +306,18 @@ class IndependentReadings(ABC):
         """All readings scatter alike."""
         return ((len(self.labels), len(self.labels)),)
 
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def log_likelihood(self, values: Mapping[str, Array], data: Any) -> Float[Array, " rows"]:
         """Log likelihood of each reading."""
-        deviation = (data["reading"] - self.expected(values, data)) / values[self.noise]
+        deviation = (data.reading - self.expected(values, data)) / values[self.noise]
         return noise_law(self.cable.description).log_density(deviation) - jnp.log(values[self.noise])
 
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def residuals(self, values: Mapping[str, Array], data: Any) -> Float[Array, " rows"]:
         """Standardized residuals; the noise follows the parameters but is not differentiated."""
         noise = jax.lax.stop_gradient(values[self.noise])
-        return noise_law(self.cable.description).residual((data["reading"] - self.expected(values, data)) / noise)
+        return noise_law(self.cable.description).residual((data.reading - self.expected(values, data)) / noise)
 
     def simulate(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+        self, values: Mapping[str, Array], data: Any, key: Array, scale: float = 1.0
     ) -> Float[Array, " rows"]:
         """Readings drawn at given parameters, with their noise times `scale`."""
         expected = self.expected(values, data)
@@ -320,7 +325,13 @@ class IndependentReadings(ABC):
 
     def observed(self) -> np.ndarray:
         """Readings in the term's unit."""
-        return self.data["reading"]
+        readings: np.ndarray = self.data.reading
+        return readings
+
+
+def find_row_angles(data: Any) -> RowAngles | None:
+    """Return the wrap angles of a term's rows, cells or recordings; None where its data have none."""
+    return getattr(getattr(data, "cells", data), "angles", None)
 
 
 def deviations_of_readings(reading: Float[Array, " read"], expected: Float[Array, " rows"]) -> Float[Array, " read"]:
@@ -340,8 +351,8 @@ def join_contributions(*parts: tuple[Array, Array]) -> Float[Array, " entries"]:
     return jnp.concatenate([jnp.where(jnp.isnan(known), 0.0, contributed) for known, contributed in parts])
 
 
-def repeat_rows(data: Mapping[str, Any], rows: int, spare: int) -> dict[str, Any]:
-    """Return arrays of rows followed by copies of them that do not count, by `COUNTS`.
+def repeat_rows(data: Data, rows: int, spare: int) -> Data:
+    """Return arrays of rows followed by copies of them that do not count, by `counts`.
 
     Args:
         data: Arrays, one entry a row.
@@ -349,7 +360,9 @@ def repeat_rows(data: Mapping[str, Any], rows: int, spare: int) -> dict[str, Any
         spare: How many there are to be.
     """
     source = np.arange(spare) % rows
-    return {name: values[source] for name, values in data.items()} | {COUNTS: np.arange(spare) < rows}
+    repeated = jax.tree.map(lambda values: values[source], data)
+    repeated_rows: Data = replace(repeated, counts=np.arange(spare) < rows)
+    return repeated_rows
 
 
 def spare_count(count: int) -> int:

@@ -34,7 +34,9 @@ from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.tables import AngleTable, Measurements
+from bowdenfit.kinds.term import find_row_angles
 from bowdenfit.kinds.terms import TERMS
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
@@ -220,26 +222,29 @@ def _without_far_scores(scores: np.ndarray) -> np.ndarray:
     return np.clip(scores, middle - reach, middle + reach)
 
 
-def _data_with(fit: Record, error: BenchError) -> tuple[dict[str, Any], ...]:
+def _data_with(fit: Record, error: BenchError) -> tuple[Any, ...]:
     """Return the data of all terms as a bench with a systematic error would have given them."""
     measurements, cable = fit.dataset.measurements, fit.model.cable
     tables = {kind.name: kind.with_bench_error(table, error) for kind, table in iterate_tables(measurements)}
     angles = Measurements(tuple(tables.values())).table(AngleTable)
     terms = [term for name, table in tables.items() for term in TERMS[name].terms(cable, table, angles)]
-    return tuple(_with_constant_angles(dict(term.data), cable, error) for term in terms)
+    return tuple(_with_constant_angles(term.data, cable, error) for term in terms)
 
 
-def _with_constant_angles(data: dict[str, Any], cable: Cable, error: BenchError) -> dict[str, Any]:
+def _with_constant_angles(data: Any, cable: Cable, error: BenchError) -> Any:
     """Return data of a term whose rows also hold the constant wrap angles of cable.toml, those without a stated error."""
-    if "is_own" not in data:
+    if isinstance(data, RunsData):
+        return replace(data, cells=_with_constant_angles(data.cells, cable, error))
+    angles = find_row_angles(data)
+    if angles is None:
         return data
-    own, is_own = np.array(data["own"], dtype=float), np.array(data["is_own"])
+    own, is_own = np.array(angles.own, dtype=float), np.array(angles.is_own)
     for k, contact in enumerate(cable.description.contact):
         constant = contact.wrap_angle.constant
         if constant is not None and constant.sd is None:
             own[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
             is_own[..., k] = True
-    return data | {"own": own, "is_own": is_own}
+    return replace(data, angles=replace(angles, own=own, is_own=is_own))
 
 
 def _widened(readings: Interval, shifts: list[float]) -> Interval:

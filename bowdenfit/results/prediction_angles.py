@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -49,7 +50,7 @@ class PredictionAngles:
         Those at a route value are the same whatever others are asked for beside it.
         """
         rows = self.rows
-        if not (rows.known_sd.any() or rows.has_angle_noise.any()):
+        if rows.is_exact:
             return np.zeros((n, 0))
         seeds = [[self.seed, _STREAM, int(bits)] for bits in np.asarray(rows.route, dtype=float).view(np.uint64)]
         scores = [np.random.default_rng(seed).standard_normal((n, rows.own.shape[1])) for seed in seeds]
@@ -57,7 +58,7 @@ class PredictionAngles:
 
     def resolve(self, cable: Cable, values: Mapping[str, Array], errors: Array) -> Float[Array, "places contacts"]:
         """Return the wrap angles [rad] at given parameters and errors, which make none negative."""
-        angles, variance = resolve_angles(cable, values, {name: jnp.asarray(x) for name, x in self.rows.data.items()})
+        angles, variance = resolve_angles(cable, values, jax.tree.map(jnp.asarray, self.rows))
         if not errors.size:
             return angles
         return jnp.maximum(angles + errors.reshape(angles.shape) * jnp.sqrt(variance), 0.0)
@@ -123,7 +124,7 @@ def choose_angles(
     for contact, angle in angle_at.items():
         here = ~np.isnan(angle)
         rows.own[here, contact], rows.is_own[here, contact] = angle[here], True
-        rows.known_sd[here, contact], rows.has_angle_noise[here, contact] = 0.0, False
+        rows.known_variance[here, contact], rows.noisy[here, contact] = 0.0, False
         for place in np.flatnonzero(here):
             words[place].append(f"{contacts[contact].name!r} bent by {np.rad2deg(angle[place]):.4g} deg")
     return PredictionAngles(replace(rows, route=at), seed, tuple(map(listed, words)), tuple(outside))

@@ -73,7 +73,7 @@ def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
         )
         return 2 * float(solved.cost)
 
-    spare = len(posterior.data[0]["angle"]) - 3
+    spare = len(posterior.data[0].angle) - 3
     level = solution.sum_of_squares * (1 + stats.f.ppf(0.9, 1, spare) / spare)
     grid = solution.z[index] + np.linspace(-1.0, 1.0, 61)
     rises = np.array([least(pin) for pin in grid]) - level

@@ -27,6 +27,7 @@ from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.recordings.reader import RecordingsTable, _File, _make_recording, _prepare_files
+from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.bench import (
@@ -54,6 +55,13 @@ TOTAL = "total exponent"
 FAULTS = LoadCellFaults(input_noise=0.5, output_noise=0.5, bits=12, input_range=(0.0, 500.0), output_range=(0.0, 500.0))
 BENCH = BenchSettings(rate=250.0)
 PROFILE = MotorProfile(speed=1.2, stroke=45.0, cycles=4, lead_in=0.5)
+
+
+def _scale_drift(data, factor):
+    """The same data with drifts in another unit of time."""
+    if isinstance(data, RunsData):
+        return replace(data, cells=replace(data.cells, drift=data.cells.drift * factor))
+    return replace(data, drift=data.drift * factor)
 
 
 @dataclass(frozen=True)
@@ -168,7 +176,7 @@ class RecordedLaboratory:
         if sd == first_sd:
             return LogDensity(first, tuple(term.data for term in model.terms))
         (term,) = model.terms
-        return LogDensity(first, (term.data | {"drift": term.data["drift"] * sd / first_sd},))
+        return LogDensity(first, (_scale_drift(term.data, sd / first_sd),))
 
     def draws(self, dataset: Dataset, seed: int) -> dict[str, np.ndarray]:
         """Draws of every parameter but the delay's error [internal units] and of the total exponent at the nominal angle."""

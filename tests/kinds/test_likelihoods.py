@@ -63,7 +63,7 @@ def _readings(seed: int, n: int, run: int = 0, strokes=(1, -1)) -> list[tuple[in
 
 def _as_read(model: Model, table: ForceTable) -> SlidingRows:
     """Rows with the forces that they together say there were; `test_expected_forces.py` is about those."""
-    angles = collect_row_angles(model.description, table, None).data
+    angles = collect_row_angles(model.description, table, None)
     return make_sliding_rows(model.description, table, angles, np.arange(len(table.run)))
 
 
@@ -108,7 +108,7 @@ def test_the_same_holds_for_several_runs_each_with_several_angles_of_its_own():
     model = _single_contact({"column": "angle"}, table)
     (term,) = model.terms
     assert isinstance(term, RunsTerm)
-    assert np.sum(term.data["weight"] > 0) == 10
+    assert np.sum(term.data.cells.weight > 0) == 10
     log_likelihood = _of_term(model, term, "log_likelihood", VALUES)
     read, exponents = _as_read(model, table), VALUES["mu"] * angles[order]
     for run in range(3):
@@ -223,19 +223,19 @@ def test_undetected_angles_have_the_probability_of_lying_below_the_limit(on_body
         return term.expected(values, data), term.log_likelihood(values, data), values["sigma_theta"]
 
     expected, computed, sigma = over_rows(evaluate, draws(model, 50, 1), term.data)
-    n, theta, sigma = len(term.data["angle"]), np.deg2rad(expected), sigma[:, None]
+    n, theta, sigma = len(term.data.angle), np.deg2rad(expected), sigma[:, None]
     np.testing.assert_allclose(
         computed[:, n:], stats.norm.logcdf((np.deg2rad(10.0) - theta[:, n:]) / sigma), rtol=1e-9, atol=1e-15
     )
-    np.testing.assert_allclose(computed[:, :n], stats.norm.logpdf(term.data["angle"], theta[:, :n], sigma), rtol=1e-9)
+    np.testing.assert_allclose(computed[:, :n], stats.norm.logpdf(term.data.angle, theta[:, :n], sigma), rtol=1e-9)
 
 
 @pytest.mark.parametrize(("how", "detected", "undetected"), [("censored", 17, 5), ("zero", 22, 0), ("dropped", 17, 0)])
 def test_undetected_angles_enter_as_the_description_says(on_body, how, detected, undetected):
     term = build_model(load_dataset(on_body, [f'tables.angles.undetected="{how}"'])).terms[0]
-    assert len(term.data["angle"]) == detected
-    assert len(term.data["limit"]) == undetected
-    assert np.count_nonzero(term.data["angle"] == 0) == (5 if how == "zero" else 0)
+    assert len(term.data.angle) == detected
+    assert len(term.data.limit) == undetected
+    assert np.count_nonzero(term.data.angle == 0) == (5 if how == "zero" else 0)
     assert len(term.labels) == detected + undetected
 
 
@@ -246,8 +246,8 @@ def test_a_row_outside_the_curves_takes_the_angle_table_s_row_with_its_error(on_
     model = on_body_model
     term = model.terms[1]
     assert term.labels[3] == "550 mm"
-    np.testing.assert_array_equal(term.data["is_own"][:, :2].any(axis=1), [False, False, False, True])
-    np.testing.assert_allclose(term.data["own"][3, :2], np.deg2rad([100.0, 37.0]))
+    np.testing.assert_array_equal(term.data.angles.is_own[:, :2].any(axis=1), [False, False, False, True])
+    np.testing.assert_allclose(term.data.angles.own[3, :2], np.deg2rad([100.0, 37.0]))
     values = {"mu1": 0.09, "mu2": 0.11, "mu3": 0.2, "sigma_theta": 0.05, "tau": 0.007}
     mean = 0.09 * np.deg2rad(100) + 0.11 * np.deg2rad(37) + 0.2 * np.deg2rad(45)
     sd = np.sqrt(0.007**2 + (0.09**2 + 0.11**2) * 0.05**2)
@@ -260,9 +260,9 @@ def test_a_row_outside_the_curves_takes_the_angle_table_s_row_with_its_error(on_
 def test_an_undetected_angle_outside_the_curves_counts_as_half_the_limit_give_or_take(on_body):
     description = load_description(on_body / "cable.toml", ["route.range=[460, 530]", "route.choices=[]"])
     term = build_model(read_dataset(description, on_body, {})).terms[1]  # 440 mm is now outside: squeezed 45, free < 10
-    np.testing.assert_allclose(term.data["own"][0, :2], np.deg2rad([5.0, 45.0]))
-    np.testing.assert_allclose(term.data["known_variance"][0, :2], [np.deg2rad(10.0) ** 2 / 12, 0.0])
-    np.testing.assert_array_equal(term.data["noisy"][0, :2], [False, True])
+    np.testing.assert_allclose(term.data.angles.own[0, :2], np.deg2rad([5.0, 45.0]))
+    np.testing.assert_allclose(term.data.angles.known_variance[0, :2], [np.deg2rad(10.0) ** 2 / 12, 0.0])
+    np.testing.assert_array_equal(term.data.angles.noisy[0, :2], [False, True])
 
 
 def test_a_row_s_own_angle_comes_before_the_curve_with_its_stated_error_or_none(on_body):
@@ -275,6 +275,6 @@ def test_a_row_s_own_angle_comes_before_the_curve_with_its_stated_error_or_none(
     )
     changed = dataset.measurements.with_tables(replace(table, own=own_angles))
     data = build_model(replace(dataset, measurements=changed)).terms[1].data
-    np.testing.assert_array_equal(data["is_own"][:, :2], [[False, True], [False] * 2, [False] * 2, [True, True]])
-    np.testing.assert_allclose(data["known_variance"][:, 1], [0.02**2, 0, 0, 0.03**2])
-    np.testing.assert_array_equal(data["noisy"][3, :2], [True, False])  # without a stated error: the angle table's
+    np.testing.assert_array_equal(data.angles.is_own[:, :2], [[False, True], [False] * 2, [False] * 2, [True, True]])
+    np.testing.assert_allclose(data.angles.known_variance[:, 1], [0.02**2, 0, 0, 0.03**2])
+    np.testing.assert_array_equal(data.angles.noisy[3, :2], [True, False])  # without a stated error: the angle table's

@@ -202,7 +202,7 @@ def test_student_noise_exchanges_the_law_of_the_standardized_deviations_and_noth
 
 def _bounds(term) -> np.ndarray:
     """Upper limits of the readings of which no more is known."""
-    return np.asarray(term.data.get("limit", term.data.get("at_most", [])))
+    return np.asarray(getattr(term.data, "limit", getattr(term.data, "at_most", [])))
 
 
 def test_the_data_sets_above_have_readings_of_which_only_a_bound_is_known():
@@ -214,7 +214,7 @@ def test_a_held_reading_has_the_probability_of_the_band_by_the_student_law():
     model = _model("held", "student")
     likelihood, residual, _, values = _of(model, np.random.default_rng(2).standard_normal((12, 2)))
     data = model.terms[0].data
-    force_in, force_out = data["input_force"], data["output_force"]
+    force_in, force_out = data.input_force, data.output_force
     ratio, limit = np.abs(np.log(force_in / force_out)), values["mu"][:, None] * WRAP_ANGLE
     sd = np.sqrt(values["tau"][:, None] ** 2 + FORCE_NOISE**2 * (1 / force_in**2 + 1 / force_out**2))
     band = stats.t.sf((ratio - limit) / sd, 4) - stats.t.sf((ratio + limit) / sd, 4)

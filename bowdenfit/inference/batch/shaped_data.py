@@ -16,7 +16,7 @@ from jax import Array
 from bowdenfit.cable.cable import Cable
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.term import Term
+from bowdenfit.kinds.term import Term, find_row_angles
 from bowdenfit.models import Model, build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -73,7 +73,8 @@ def shape_dataset(dataset: Dataset, spare: bool = False) -> ShapedDataset:
 def _has_angles(model: Model) -> bool:
     """Return whether every row has its own angle wherever the mean angle of all rows would be used otherwise."""
     nominal = [c.name in model.cable.nominal for c in model.description.contact]
-    return all("is_own" in term.data and np.all(term.data["is_own"][..., nominal]) for term in model.terms)
+    angles = [find_row_angles(term.data) for term in model.terms]
+    return all(rows is not None and np.all(rows.is_own[..., nominal]) for rows in angles)
 
 
 def _with_cable(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:

@@ -1,8 +1,8 @@
 """Angle tables in the likelihood: readings about their curve, and angles too small to detect as censored."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +28,25 @@ from bowdenfit.kinds.term import (
 )
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.types import DataArray
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class AnglesData:
+    """Arrays of an angle table.
+
+    Args:
+        route: Route values of each curve's readings, by column, (readings of the curve).
+        order: Order that puts detected readings first, (readings).
+        angle: Detected angles [rad], (detected); NaN where there is none.
+        limit: Limits of undetected angles [rad], (undetected); NaN where there is none.
+    """
+
+    route: dict[str, DataArray]
+    order: DataArray
+    angle: DataArray
+    limit: DataArray
 
 
 @dataclass(frozen=True)
@@ -40,13 +59,12 @@ class AnglesTerm:
 
     Args:
         cable: The cable.
-        data: Route values of each curve's readings; the order that puts detected readings first; detected angles and
-            the limits of undetected ones [rad]. Where these are NaN there is none.
+        data: Its arrays.
         labels: Each reading in words, detected ones first.
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: AnglesData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "wrap_angle"
     unit: str = "deg"
@@ -59,49 +77,48 @@ class AnglesTerm:
         return ((len(self.labels), len(self.labels)),)
 
     @property
-    def padded(self) -> dict[str, Any]:
+    def padded(self) -> AnglesData:
         """See `LogDensity.padded`: every reading in its own place, as one that was detected and as one that was not."""
-        order = self.data["order"]
+        order, detected = self.data.order, len(self.data.angle)
         angle, limit = np.full((2, len(order)), np.nan)
-        angle[order[: len(self.data["angle"])]] = self.data["angle"]
-        limit[order[len(self.data["angle"]) :]] = self.data["limit"]
-        return self.data | {"order": np.arange(len(order)), "angle": angle, "limit": limit}
+        angle[order[:detected]], limit[order[detected:]] = self.data.angle, self.data.limit
+        return replace(self.data, order=np.arange(len(order)), angle=angle, limit=limit)
 
-    def _expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+    def _expected(self, values: Mapping[str, Array], data: AnglesData) -> Float[Array, " readings"]:
         curves = self.cable.curves
-        parts = [curve.wrap_angle(values, data["route"][column]) for column, curve in curves.items()]
-        return jnp.concatenate(parts)[data["order"]]
+        parts = [curve.wrap_angle(values, data.route[column]) for column, curve in curves.items()]
+        return jnp.concatenate(parts)[data.order]
 
     def _deviations(
-        self, values: Mapping[str, Array], data: Mapping[str, Any]
+        self, values: Mapping[str, Array], data: AnglesData
     ) -> tuple[Float[Array, " detected"], Float[Array, " undetected"]]:
         """Return standardized deviations of the detected readings, and of the limits of the undetected ones."""
         theta, sigma = self._expected(values, data), values[ANGLE_NOISE]
-        return deviations_of_readings(data["angle"], theta) / sigma, deviations_of_bounds(data["limit"], theta) / sigma
+        return deviations_of_readings(data.angle, theta) / sigma, deviations_of_bounds(data.limit, theta) / sigma
 
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+    def log_likelihood(self, values: Mapping[str, Array], data: AnglesData) -> Float[Array, " readings"]:
         """Log likelihood of each reading."""
         (deviation, u), law = self._deviations(values, data), noise_law(self.cable.description)
         read = law.log_density(deviation) - jnp.log(values[ANGLE_NOISE])
-        return join_contributions((data["angle"], read), (data["limit"], law.log_cdf(u)))
+        return join_contributions((data.angle, read), (data.limit, law.log_cdf(u)))
 
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+    def residuals(self, values: Mapping[str, Array], data: AnglesData) -> Float[Array, " readings"]:
         """Standardized residuals; sqrt(-2 log likelihood) for undetected angles."""
         (deviation, u), law = self._deviations(values, data), noise_law(self.cable.description)
-        return join_contributions((data["angle"], law.residual(deviation)), (data["limit"], law.bound_residual(u)))
+        return join_contributions((data.angle, law.residual(deviation)), (data.limit, law.bound_residual(u)))
 
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
+    def expected(self, values: Mapping[str, Array], data: AnglesData) -> Float[Array, " readings"]:
         """Expected readings [deg]."""
         return jnp.rad2deg(self._expected(values, data))
 
-    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " readings"]:
+    def simulate(self, values: Mapping[str, Array], data: AnglesData, key: Array) -> Float[Array, " readings"]:
         """Readings as the bench would give them, undetected ones included [deg]."""
         theta = self._expected(values, data)
         return jnp.rad2deg(theta + values[ANGLE_NOISE] * scatter(key, theta.shape, self.cable.description))
 
     def observed(self) -> np.ndarray:
         """Readings [deg]; NaN where undetected."""
-        return np.rad2deg(np.concatenate([self.data["angle"], np.full(len(self.data["limit"]), np.nan)]))
+        return np.rad2deg(np.concatenate([self.data.angle, np.full(len(self.data.limit), np.nan)]))
 
 
 def make_angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
@@ -127,12 +144,8 @@ def make_angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
             readings.append((shown, at_most, f"{column} at {length:g} {route.unit}"))
     detected = np.array([np.isfinite(reading) for reading, _, _ in readings], dtype=bool)
     order = np.concatenate([np.flatnonzero(detected), np.flatnonzero(~detected)])
-    data = {
-        "route": routes,
-        "order": order,
-        "angle": np.array([readings[i][0] for i in order[: detected.sum()]]),
-        "limit": np.array([readings[i][1] for i in order[detected.sum() :]]),
-    }
+    angles, limits = ([readings[i][k] for i in part] for k, part in enumerate(np.split(order, [detected.sum()])))
+    data = AnglesData(routes, order, np.array(angles), np.array(limits))
     return AnglesTerm(cable, data, tuple(readings[i][2] for i in order))
 
 
@@ -218,7 +231,7 @@ class AngleCandidates(CandidateKind):
         table = AngleTable(route, columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin)
         term = make_angles_term(at.cable, table)
         # Every row is detected, so readings are curve by curve; a curve may hold over a part of the range only.
-        read_at = np.concatenate([term.data["route"][column] for column in columns])
+        read_at = np.concatenate([term.data.route[column] for column in columns])
         limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
         readings = [tuple(int(k) for k in np.flatnonzero(read_at == length)) for length in route]
         return Simulation(term.simulate, term.data, readings, float(np.rad2deg(limit)))
@@ -266,7 +279,7 @@ class AngleTerms(TermKind[AngleTable]):
     @override
     def count_readings(self, term: Term, description: Description) -> str:
         """Return how many readings the curves were fitted to, and how those too small to detect entered."""
-        entered, censored = len(term.data["angle"]), len(term.data["limit"])
+        entered, censored = len(term.data.angle), len(term.data.limit)
         how = {
             "censored": "",
             "zero": ", those too small to detect taken as 0",

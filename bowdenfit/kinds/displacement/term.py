@@ -1,7 +1,7 @@
 """Force at the motor against displacement in the likelihood: the far end, the rope, and the mounting of each run."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import jax
@@ -15,7 +15,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.sensors import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementSettings, DisplacementTable, Turns
-from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_rope, declare_run_scatter
 from bowdenfit.kinds.tables import AngleTable, StretchTable
@@ -23,13 +23,13 @@ from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind, Trut
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
+from bowdenfit.types import DataArray
 
 END_SPRING, ROPE_STIFFNESS, ROPE_GIVE, DISPLACEMENT_NOISE = "end_spring", "rope_stiffness", "rope_give", "sigma_x"
 MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
 _LEAST_GIVE = 1e-9  # give of the rope over the spring's, to keep its stiffness finite
 LEAST_EXPONENT = 1e-9  # friction exponent with its mounting effect, below which friction would push
 Values = Mapping[str, Array]
-Data = Mapping[str, Any]
 
 
 def rows_by_run(table: DisplacementTable) -> np.ndarray:
@@ -51,21 +51,65 @@ def reading_arrays(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]
     }
 
 
-def split_turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class TurnArrays:
+    """Turns of the motor at one depth; every array is (turns).
+
+    Args:
+        at: Displacement [mm].
+        stroke: +1 or -1, which way it went on.
+        after: Rank of the turn before it among those of lower depth.
+        run: Number of its run.
+    """
+
+    at: DataArray
+    stroke: DataArray
+    after: DataArray
+    run: DataArray
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class DisplacementData:
+    """Arrays of force against displacement.
+
+    Args:
+        force: Force of each reading [N], (readings), in order of their runs.
+        displacement: Displacement [mm], (readings).
+        stroke: +1 or -1, which way the motor went, (readings).
+        after: Rank of the turn before it in order of depth, (readings).
+        slides: Whether all of the rope slides, (readings).
+        run: Number of the run, (readings).
+        start: First reading of the run, (readings).
+        turns: Turns by depth.
+        run_angles: Wrap angles of the runs.
+    """
+
+    force: DataArray
+    displacement: DataArray
+    stroke: DataArray
+    after: DataArray
+    slides: DataArray
+    run: DataArray
+    start: DataArray
+    turns: tuple[TurnArrays, ...]
+    run_angles: RowAngles
+
+
+def split_turns_by_depth(turns: Turns) -> tuple[TurnArrays, ...]:
     """Split the turns by depth, each with the rank of the turn before it among those of lower depth."""
     rank = rank_by_depth(turns)
-    at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": rank[turns.after], "run": turns.run}
-    return tuple(
-        {name: values[turns.depth == depth] for name, values in at.items()}
-        for depth in range(int(turns.depth.max()) + 1)
-    )
+    arrays = TurnArrays(turns.at, turns.stroke.astype(float), rank[turns.after], turns.run)
+    by_depth = (turns.depth == depth for depth in range(int(turns.depth.max()) + 1))
+    return tuple(jax.tree.map(lambda values, mask=mask: values[mask], arrays) for mask in by_depth)
 
 
-def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> dict[str, np.ndarray]:
+def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> RowAngles:
     """Return the wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
     own_angles = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
-    return collect_row_angles(cable.description, RowConditions(table.route[first], own_angles), angles).data
+    return collect_row_angles(cable.description, RowConditions(table.route[first], own_angles), angles)
 
 
 def rank_by_depth(turns: Turns) -> np.ndarray:
@@ -95,7 +139,7 @@ class DisplacementTerm:
 
     Args:
         cable: The cable.
-        data: Arrays over readings in order of their runs, over runs, and over turns of the motor by depth.
+        data: Its arrays.
         labels: Each reading in words.
         zeros: Parameters of the displacement without force, one a run.
         stop: Whether the far end pulls against a stop.
@@ -103,7 +147,7 @@ class DisplacementTerm:
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: DisplacementData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     zeros: tuple[str, ...]
     stop: bool
@@ -119,14 +163,14 @@ class DisplacementTerm:
         rows, runs = len(self.labels), len(self.zeros)
         return ((rows, rows - runs), (runs, runs))
 
-    def exponents(self, values: Values, data: Data) -> tuple[Float[Array, " runs"], Float[Array, " runs"]]:
+    def exponents(self, values: Values, data: DisplacementData) -> tuple[Float[Array, " runs"], Float[Array, " runs"]]:
         """Return the friction exponent of each run [1], and its variance from errors of the wrap angles."""
-        angles, variance = resolve_angles(self.cable, values, data["angles"])
+        angles, variance = resolve_angles(self.cable, values, data.run_angles)
         exponent = self.cable.friction_exponent(values, angles)
         return exponent, self.cable.exponent_variance(values, angles, variance)
 
     def load_cell_force(
-        self, values: Values, data: Data, exponent: Float[Array, " runs"], beside: Array | float = 0.0
+        self, values: Values, data: DisplacementData, exponent: Float[Array, " runs"], beside: Array | float = 0.0
     ) -> Array:
         """Return the force that the motor's load cell shows at each reading [N].
 
@@ -144,20 +188,20 @@ class DisplacementTerm:
         def tendon(run: Array) -> Tendon:
             return Tendon(exponent[run], compliance, rope)
 
-        first, *later = data["turns"]
-        travel = first["at"] - zero[first["run"]]
-        known = Turn(travel, *tendon(first["run"]).sliding(travel, first["stroke"]))
+        first, *later = data.turns
+        travel = first.at - zero[first.run]
+        known = Turn(travel, *tendon(first.run).sliding(travel, first.stroke))
         for turns in later:
-            travel = turns["at"] - zero[turns["run"]]
-            force, mean = tendon(turns["run"]).sliding_after_turn(_select_turns(known, turns["after"]), travel, turns["stroke"])
+            travel = turns.at - zero[turns.run]
+            force, mean = tendon(turns.run).sliding_after_turn(_select_turns(known, turns.after), travel, turns.stroke)
             parts = ((known.travel, travel), (known.force, force), (known.mean, mean))
             known = Turn(*(jnp.concatenate(part) for part in parts))
-        travel, at = data["displacement"] + beside - zero[data["run"]], tendon(data["run"])
-        sliding = at.sliding(travel, data["stroke"])[0]
-        since = at.sliding_after_turn(_select_turns(known, data["after"]), travel, data["stroke"])[0]
-        return LoadCells.of(values).shown_input(jnp.where(data["slides"], sliding, since))
+        travel, at = data.displacement + beside - zero[data.run], tendon(data.run)
+        sliding = at.sliding(travel, data.stroke)[0]
+        since = at.sliding_after_turn(_select_turns(known, data.after), travel, data.stroke)[0]
+        return LoadCells.of(values).shown_input(jnp.where(data.slides, sliding, since))
 
-    def _linearize(self, values: Values, data: Data, weights: Values) -> "_Linearization":
+    def _linearize(self, values: Values, data: DisplacementData, weights: Values) -> "_Linearization":
         exponent, angle_variance = self.exponents(values, data)
         mean, slope = jax.jvp(lambda at: self.load_cell_force(values, data, at), (exponent,), (jnp.ones_like(exponent),))
         if weights is not values:
@@ -169,44 +213,46 @@ class DisplacementTerm:
             variance = variance + ((more - less) / 2) ** 2
         of_runs = weights[RUN_SCATTER] ** 2 + angle_variance
         return _Linearization(
-            mean, data["force"] - mean, slope, jnp.broadcast_to(variance, mean.shape), of_runs, data["run"]
+            mean, data.force - mean, slope, jnp.broadcast_to(variance, mean.shape), of_runs, data.run
         )
 
-    def _predict_sequentially(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
+    def _predict_sequentially(
+        self, values: Values, data: DisplacementData
+    ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Return mean and standard deviation of each reading [N], given those before it in its run."""
         linear = self._linearize(values, data, values)
-        information = _sum_before(linear.slope**2 / linear.variance, data["start"])
-        score = _sum_before(linear.slope * linear.deviation / linear.variance, data["start"])
-        of_run = linear.of_runs[data["run"]]
+        information = _sum_before(linear.slope**2 / linear.variance, data.start)
+        score = _sum_before(linear.slope * linear.deviation / linear.variance, data.start)
+        of_run = linear.of_runs[data.run]
         left = of_run / (1 + of_run * information)
         return linear.mean + linear.slope * left * score, jnp.sqrt(linear.variance + linear.slope**2 * left)
 
-    def expected(self, values: Values, data: Data) -> Float[Array, " rows"]:
+    def expected(self, values: Values, data: DisplacementData) -> Float[Array, " rows"]:
         """Expected forces in the mounting of each run, as its readings together show it [N]."""
         linear = self._linearize(values, data, values)
-        return linear.mean + linear.slope * linear.mounting[0][data["run"]]
+        return linear.mean + linear.slope * linear.mounting[0][data.run]
 
-    def log_likelihood(self, values: Values, data: Data) -> Float[Array, " rows"]:
+    def log_likelihood(self, values: Values, data: DisplacementData) -> Float[Array, " rows"]:
         """Log likelihood of each reading, given those before it in its run."""
-        return noise_law(self.cable.description).log_density(data["force"], *self._predict_sequentially(values, data))
+        return noise_law(self.cable.description).log_density(data.force, *self._predict_sequentially(values, data))
 
-    def residuals(self, values: Values, data: Data) -> Float[Array, " rows_and_runs"]:
+    def residuals(self, values: Values, data: DisplacementData) -> Float[Array, " rows_and_runs"]:
         """Standardized residuals of readings in their run, and of runs; weights follow the parameters, undifferentiated."""
         law, weights = noise_law(self.cable.description), jax.lax.stop_gradient(dict(values))
         linear = self._linearize(values, data, weights)
         mounting, variance = linear.mounting
         slope, sd = (jax.lax.stop_gradient(array) for array in (linear.slope, jnp.sqrt(linear.variance)))
-        inside = (linear.deviation - slope * mounting[data["run"]]) / sd
+        inside = (linear.deviation - slope * mounting[data.run]) / sd
         return jnp.concatenate(
             [law.residual(inside), mounting / jax.lax.stop_gradient(jnp.sqrt(linear.of_runs + variance))]
         )
 
-    def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " rows"]:
+    def simulate(self, values: Values, data: DisplacementData, key: Array) -> Float[Array, " rows"]:
         """Forces as the bench would give them, each after the readings before it [N]."""
         mean, sd = self._predict_sequentially(values, data)
         return mean + sd * scatter(key, mean.shape, self.cable.description)
 
-    def mounted_exponents(self, values: Values, data: Data) -> Float[Array, " runs"]:
+    def mounted_exponents(self, values: Values, data: DisplacementData) -> Float[Array, " runs"]:
         """Return the friction exponent of each run [1], its mounting effect estimated from its readings."""
         linear = self._linearize(values, data, values)
         mounting, variance = linear.mounting
@@ -215,8 +261,8 @@ class DisplacementTerm:
     def friction_effect(self, values: Mapping[str, float]) -> np.ndarray:
         """Return the part of each force that is due to friction [N], to first order."""
 
-        def effect(at: Values, data: Data) -> Float[Array, " rows"]:
-            return self._linearize(at, data, at).slope * self.exponents(at, data)[0][data["run"]]
+        def effect(at: Values, data: DisplacementData) -> Float[Array, " rows"]:
+            return self._linearize(at, data, at).slope * self.exponents(at, data)[0][data.run]
 
         return np.asarray(
             jax.jit(effect)(dict(values), self.data)
@@ -224,7 +270,7 @@ class DisplacementTerm:
 
     def observed(self) -> np.ndarray:
         """Measured forces [N]."""
-        return self.data["force"]
+        return self.data.force
 
 
 @jax.tree_util.register_dataclass
@@ -280,8 +326,12 @@ def make_displacement_term(cable: Cable, table: DisplacementTable, angles: Angle
     rows = rows_by_run(table)
     settings = cable.description.table(DisplacementSettings)
     stop = settings is not None and settings.end == "stop"
-    data = {"turns": split_turns_by_depth(table.motion.turns), "angles": angles_of_runs(cable, table, angles)}
-    data |= {"force": table.force[rows], **reading_arrays(table, rows)}
+    data = DisplacementData(
+        force=table.force[rows],
+        **reading_arrays(table, rows),
+        turns=split_turns_by_depth(table.motion.turns),
+        run_angles=angles_of_runs(cable, table, angles),
+    )
     return DisplacementTerm(cable, data, tuple(table.origin.describe_row(int(i)) for i in rows), zero_names(table), stop)
 
 
@@ -374,7 +424,7 @@ class DisplacementTerms(TermKind[DisplacementTable]):
         """Draw forces of every row with noise in cell and displacement; those of a run share its mounting and angles."""
         of_run, of_force, of_x = jax.random.split(jax.random.fold_in(truth.key, 7), 3)
         term, values, scale = make_displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
-        data = jax.tree.map(jnp.asarray, term.data | reading_arrays(table, np.arange(len(table.run))))
+        data = jax.tree.map(jnp.asarray, replace(term.data, **reading_arrays(table, np.arange(len(table.run)))))
         exponent, angle_variance = term.exponents(values, data)
         mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
         shape = table.force.shape

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -18,13 +17,32 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, simulate_rows
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.plausibility import choose_unused_columns
-from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.shared_parameters import declare_run_scatter
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth, repeat_rows, spare_count
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
+from bowdenfit.types import DataArray
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class EfficienciesData:
+    """Arrays of an efficiency table.
+
+    Args:
+        angles: Wrap angles of the rows.
+        loss: Minus log efficiency of each row [1], (rows).
+        log_sd: Stated standard deviation of that [1], (rows).
+        counts: Whether a row counts, (rows); None where all do.
+    """
+
+    angles: RowAngles
+    loss: DataArray
+    log_sd: DataArray
+    counts: DataArray | None = None
 
 
 @dataclass(frozen=True)
@@ -41,12 +59,12 @@ class EfficienciesTerm:
 
     Args:
         cable: The cable.
-        data: Arrays, one entry a row.
+        data: Its arrays.
         labels: Each row in words.
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: EfficienciesData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "efficiency"
     unit: str = "1"
@@ -63,36 +81,36 @@ class EfficienciesTerm:
         return ((len(self.labels), len(self.labels)),)
 
     @property
-    def with_spare_rows(self) -> dict[str, Any]:
+    def with_spare_rows(self) -> EfficienciesData:
         """See `LogDensity.with_spare_rows`: the rows followed by copies of them that do not count."""
         return repeat_rows(self.data, len(self.labels), spare_count(len(self.labels)))
 
     def _mean_and_sd(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
+        self, values: Mapping[str, Array], data: EfficienciesData, weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
-        angles, variance = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles, route=data["route"])
+        angles, variance = resolve_angles(self.cable, values, data.angles)
+        exponent = self.cable.friction_exponent(values, angles, route=data.angles.route)
         mean = LoadCells.of(values).gain_error + (
             -jnp.log(self.cable.friction.efficiency(values, exponent)) if self.cable.friction.options else exponent
         )
         from_angles = self.cable.exponent_variance(weights, angles, variance)
-        return mean, jnp.sqrt(weights[RUN_SCATTER] ** 2 + data["log_sd"] ** 2 + from_angles)
+        return mean, jnp.sqrt(weights[RUN_SCATTER] ** 2 + data.log_sd ** 2 + from_angles)
 
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def log_likelihood(self, values: Mapping[str, Array], data: EfficienciesData) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
-        return noise_law(self.cable.description).log_density(data["loss"], *self._mean_and_sd(values, data, values))
+        return noise_law(self.cable.description).log_density(data.loss, *self._mean_and_sd(values, data, values))
 
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def residuals(self, values: Mapping[str, Array], data: EfficienciesData) -> Float[Array, " rows"]:
         """Standardized residuals; the weights follow the parameters but are not differentiated."""
         mean, sd = self._mean_and_sd(values, data, jax.lax.stop_gradient(dict(values)))
-        return noise_law(self.cable.description).residual((data["loss"] - mean) / jax.lax.stop_gradient(sd))
+        return noise_law(self.cable.description).residual((data.loss - mean) / jax.lax.stop_gradient(sd))
 
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def expected(self, values: Mapping[str, Array], data: EfficienciesData) -> Float[Array, " rows"]:
         """Expected efficiencies [1]."""
         return transmission_efficiency(self._mean_and_sd(values, data, values)[0])
 
     def simulate(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+        self, values: Mapping[str, Array], data: EfficienciesData, key: Array, scale: float = 1.0
     ) -> Float[Array, " rows"]:
         """Efficiencies as the bench would give them [1], with all that makes them scatter times `scale`."""
         mean, sd = self._mean_and_sd(values, data, values)
@@ -100,13 +118,13 @@ class EfficienciesTerm:
 
     def observed(self) -> np.ndarray:
         """Measured efficiencies [1]."""
-        return np.exp(-self.data["loss"])
+        return np.exp(-self.data.loss)
 
 
 def make_efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
     """Return the term of an efficiency table."""
     rows = collect_row_angles(cable.description, table, angles)
-    data = rows.data | {"loss": -np.log(table.efficiency), "log_sd": table.sd / table.efficiency}
+    data = EfficienciesData(rows, -np.log(table.efficiency), table.sd / table.efficiency)
     route = cable.description.route
     labels = tuple(
         f"{length:g} {route.unit}" if route else table.origin.describe_row(i) for i, length in enumerate(table.route)

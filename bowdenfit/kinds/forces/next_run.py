@@ -25,7 +25,7 @@ from bowdenfit.kinds.forces.stated_noise import STATED_NOISE
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.recordings.blocks import effective_counts, is_under_tension
 from bowdenfit.kinds.recordings.reader import angles_of_recordings
-from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.recording import Recordings
@@ -119,7 +119,7 @@ def set_load_and_stroke(design: RunDesign, load: float, stroke: int) -> RunDesig
 
 def make_run_simulator(
     cable: Cable, design: RunDesign
-) -> tuple[Callable[[Mapping[str, Array], Mapping[str, Any], Array], Array], int]:
+) -> tuple[Callable[[Mapping[str, Array], RowAngles, Array], Array], int]:
     """Return a function that simulates runs at rows of wrap angles, and how many numbers it gives for each.
 
     A run is told by the coefficients of a weighted straight-line fit to its log ratios: their mean, what differs between
@@ -132,10 +132,10 @@ def make_run_simulator(
     fit = _straight_line(cable, design)
     force, stroke, velocity = (jnp.asarray(a) for a in (design.input_force, design.stroke, design.velocity))
 
-    def simulate(values: Mapping[str, Array], rows: Mapping[str, Any], key: Array) -> Array:
+    def simulate(values: Mapping[str, Array], rows: RowAngles, key: Array) -> Array:
         of_mounting, of_input, of_output = jax.random.split(key, 3)
         angles, variance = resolve_angles(cable, values, rows)
-        exponent = cable.friction_exponent(values, angles, route=rows["route"])
+        exponent = cable.friction_exponent(values, angles, route=rows.route)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + cable.exponent_variance(values, angles, variance))
         mounted = exponent + sd * scatter(of_mounting, exponent.shape, cable.description)
         shift = mounted[:, None] * cable.friction.rate(values, velocity)
@@ -235,7 +235,7 @@ class ForceRunCandidates(CandidateKind):
             alike = [candidates[i] for i in members]
             route, own_angles, _ = at.rows(alike)
             simulate, width = make_run_simulator(at.cable, set_load_and_stroke(typical, alike[0].load, alike[0].stroke))
-            parts.append((simulate, collect_row_angles(at.cable.description, RowConditions(route, own_angles), at.angles).data))
+            parts.append((simulate, collect_row_angles(at.cable.description, RowConditions(route, own_angles), at.angles)))
             for i in members:
                 columns[i] = tuple(range(start, start + width))
                 start += width

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -19,18 +18,38 @@ from bowdenfit.kinds.forces.next_run import ForceRunCandidates
 from bowdenfit.kinds.forces.stated_noise import STATED_NOISE, log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import choose_unused_columns
-from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
-from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, ExpectedForces, SlidingRows, expected_forces
+from bowdenfit.kinds.sliding_rows import ExpectedForces, SlidingRows, expected_forces
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth, repeat_rows, spare_count
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.types import Labels, Vector
+from bowdenfit.types import DataArray, Labels, Vector
 
 _ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one load; a judgement
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class HeldForcesData:
+    """Arrays of held readings.
+
+    Args:
+        angles: Wrap angles of the rows.
+        input_force, output_force: Forces [N], (rows).
+        input_noise, output_noise: Noise of each in units of the noise parameter, (rows).
+        counts: Whether a row counts, (rows); None where all do.
+    """
+
+    angles: RowAngles
+    input_force: DataArray
+    output_force: DataArray
+    input_noise: DataArray
+    output_noise: DataArray
+    counts: DataArray | None = None
 
 
 @dataclass(frozen=True)
@@ -52,13 +71,13 @@ class HeldForcesTerm:
 
     Args:
         cable: The cable.
-        data: Arrays, one entry a row.
+        data: Its arrays.
         labels: Each row in words.
         reading_noise: Parameter in units of which the noise of each reading is given.
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: HeldForcesData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "held_ratio"
     unit: str = "1"
@@ -71,28 +90,28 @@ class HeldForcesTerm:
         return ((len(self.labels), 0),)
 
     @property
-    def with_spare_rows(self) -> dict[str, Any]:
+    def with_spare_rows(self) -> HeldForcesData:
         """See `LogDensity.with_spare_rows`: the rows followed by copies of them that do not count."""
         return repeat_rows(self.data, len(self.labels), spare_count(len(self.labels)))
 
     def _difference(
-        self, values: Mapping[str, Array], data: Mapping[str, Any]
+        self, values: Mapping[str, Array], data: HeldForcesData
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Return input less output force on the scale on which friction is a shift, and its variance from the load cells."""
         friction, cells, least = self.cable.friction, LoadCells.of(values), self.cable.friction.conditions.least_force
-        input_force = cells.true_input(data["input_force"], least)
-        output_force = cells.true_output(data["output_force"], least)
-        of_input = data["input_noise"] * friction.slope(values, input_force)
-        slopes = of_input**2 + (data["output_noise"] * friction.slope(values, output_force)) ** 2
+        input_force = cells.true_input(data.input_force, least)
+        output_force = cells.true_output(data.output_force, least)
+        of_input = data.input_noise * friction.slope(values, input_force)
+        slopes = of_input**2 + (data.output_noise * friction.slope(values, output_force)) ** 2
         difference = friction.scaled(values, input_force) - friction.scaled(values, output_force)
         return difference, slopes * values[self.reading_noise] ** 2
 
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def log_likelihood(self, values: Mapping[str, Array], data: HeldForcesData) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
-        angles, variance = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles, data["group"], data["route"])
+        angles, variance = resolve_angles(self.cable, values, data.angles)
+        exponent = self.cable.friction_exponent(values, angles, data.angles.group, data.angles.route)
         difference, from_cells = self._difference(values, data)
-        from_angles = self.cable.exponent_variance(values, angles, variance, data["group"])
+        from_angles = self.cable.exponent_variance(values, angles, variance, data.angles.group)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_angles + from_cells)
         pulling, returning = self.cable.friction.shifts(values, exponent)
         beyond = jnp.abs(difference - (pulling - returning) / 2)  # about its middle the band is symmetric
@@ -101,39 +120,40 @@ class HeldForcesTerm:
         # A band of no width at all holds no reading; the floor keeps its logarithm finite.
         return upper + jnp.log1p(-jnp.exp(jnp.minimum(lower - upper, -1e-12)))
 
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def residuals(self, values: Mapping[str, Array], data: HeldForcesData) -> Float[Array, " rows"]:
         """sqrt(-2 log likelihood), zero well inside the band."""
         return jnp.sqrt(jnp.maximum(-2 * self.log_likelihood(values, data), 1e-30))
 
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def expected(self, values: Mapping[str, Array], data: HeldForcesData) -> Float[Array, " rows"]:
         """Largest ratio of input to output force that friction can hold at the row's input force [1]."""
-        angles, _ = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles, data["group"], data["route"])
-        return data["input_force"] / self._output_force(values, data, exponent)
+        angles, _ = resolve_angles(self.cable, values, data.angles)
+        exponent = self.cable.friction_exponent(values, angles, data.angles.group, data.angles.route)
+        return data.input_force / self._output_force(values, data, exponent)
 
     def _output_force(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], shift: Float[Array, " rows"]
+        self, values: Mapping[str, Array], data: HeldForcesData, shift: Float[Array, " rows"]
     ) -> Float[Array, " rows"]:
         """Return the output force that the load cell shows at a shift on the scale g [N]; it stays positive."""
         cells, least = LoadCells.of(values), self.cable.friction.conditions.least_force
-        input_force = cells.true_input(data["input_force"], least)
+        input_force = cells.true_input(data.input_force, least)
         output = self.cable.friction.output_force(values, input_force, shift, jnp.ones(()))
         return cells.shown_output(output, least)
 
-    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
+    def simulate(self, values: Mapping[str, Array], data: HeldForcesData, key: Array) -> Float[Array, " rows"]:
         """A ratio of input to output force anywhere in the band, with noise [1]."""
         band, noise = jax.random.split(key)
-        angles, _ = resolve_angles(self.cable, values, data)
-        limit = self.cable.friction_exponent(values, angles, data["group"], data["route"])
+        angles, _ = resolve_angles(self.cable, values, data.angles)
+        limit = self.cable.friction_exponent(values, angles, data.angles.group, data.angles.route)
         _, from_cells = self._difference(values, data)
         inside = limit * jax.random.uniform(band, limit.shape, minval=-1.0, maxval=1.0)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_cells)
         shift = inside + sd * scatter(noise, limit.shape, self.cable.description)
-        return data["input_force"] / self._output_force(values, data, shift)
+        return data.input_force / self._output_force(values, data, shift)
 
     def observed(self) -> np.ndarray:
         """Ratio of input to output force [1]."""
-        return self.data["input_force"] / self.data["output_force"]
+        ratio: np.ndarray = self.data.input_force / self.data.output_force
+        return ratio
 
 
 def _number_groups(cable: Cable, table: ForceTable) -> Labels:
@@ -153,7 +173,7 @@ def _declare_noise_factor() -> Parameter:
 
 
 def make_sliding_rows(
-    description: Description, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray
+    description: Description, table: ForceTable, rows: RowAngles, used: np.ndarray
 ) -> SlidingRows:
     """Return some rows of a table, with the forces that the readings of each run together estimate.
 
@@ -164,7 +184,8 @@ def make_sliding_rows(
         used: Numbers of the rows.
     """
     stroke, force_in, force_out = table.stroke[used], table.input_force[used], table.output_force[used]
-    keys = np.column_stack([table.run[used], stroke, *(rows[name][used] for name in ROW_ARRAYS)])
+    angles = rows.select(used)
+    keys = np.column_stack([table.run[used], stroke, *jax.tree.leaves(angles)])
     expected, weight = _expect_forces(description, table, used, keys)
     return SlidingRows(
         expected.input_force,
@@ -175,7 +196,7 @@ def make_sliding_rows(
         table.velocity[used],
         np.zeros(len(used)),
         np.ones(len(used)),
-        {name: rows[name][used] for name in ROW_ARRAYS},
+        angles,
         weight,
         _unused_columns(table, used),
     )
@@ -251,7 +272,7 @@ class ForceTerms(TermKind[ForceTable]):
         self, cable: Cable, table: ForceTable, angles: AngleTable | None
     ) -> tuple[RunsTerm | HeldForcesTerm, ...]:
         """Return a term of the sliding rows by run, and one of the held rows one by one."""
-        rows = collect_row_angles(cable.description, table, angles).data | {"group": _number_groups(cable, table)}
+        rows = replace(collect_row_angles(cable.description, table, angles), group=_number_groups(cable, table))
         terms: list[RunsTerm | HeldForcesTerm] = []
         noises = table.noises(cable.description.sensors.noise_ratio)
         sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
@@ -261,12 +282,8 @@ class ForceTerms(TermKind[ForceTable]):
             noise = name_noise(table)
             terms.append(RunsTerm(cable, sum_runs(cable, readings), labels, reading_noise=noise, rows=readings))
         if len(held):
-            data = {name: rows[name][held] for name in ROW_ARRAYS} | {
-                "input_force": table.input_force[held],
-                "output_force": table.output_force[held],
-                "input_noise": noises[held, 0],
-                "output_noise": noises[held, 1],
-            }
+            forces = table.input_force[held], table.output_force[held]
+            data = HeldForcesData(rows.select(held), *forces, noises[held, 0], noises[held, 1])
             words = tuple(table.origin.describe_row(int(i)) for i in held)
             terms.append(HeldForcesTerm(cable, data, words, reading_noise=name_noise(table)))
         return tuple(terms)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, choose_loads, simulate_rows
-from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_preload
 from bowdenfit.kinds.tables import AngleTable, LoopTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind, Truth
@@ -29,9 +29,35 @@ from bowdenfit.physics.loop import (
     loop_response_from,
     moving_preload,
 )
+from bowdenfit.types import DataArray
 
 LOOP_FORCE = "loop_output_force"
 LOOP_MOUNTING = "loop_mounting"
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LoopData:
+    """Arrays of a loop table.
+
+    Args:
+        angles: Wrap angles of the rows.
+        input_force, output_force: Forces [N], (rows).
+        stroke: +1 pulling, -1 return, (rows).
+        preload: Preload of the row's own [N], (rows); 0 without one.
+        has_preload: Whether a row has one, (rows).
+        cases: The different wrap angles of rows [rad], (cases, contacts); None where they are not known exactly.
+        spread: Matrix that gives each row its case, (cases, rows).
+    """
+
+    angles: RowAngles
+    input_force: DataArray
+    output_force: DataArray
+    stroke: DataArray
+    preload: DataArray
+    has_preload: DataArray
+    cases: DataArray = None
+    spread: DataArray = None
 
 
 @dataclass(frozen=True)
@@ -49,12 +75,12 @@ class LoopTerm:
 
     Args:
         cable: The cable.
-        data: Arrays, one entry a row.
+        data: Its arrays.
         labels: Each row in words.
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: LoopData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = LOOP_FORCE
     unit: str = "N"
@@ -67,28 +93,28 @@ class LoopTerm:
         return ((len(self.labels), len(self.labels)),)
 
     def _response(
-        self, values: Mapping[str, Array], data: Mapping[str, Any]
+        self, values: Mapping[str, Array], data: LoopData
     ) -> tuple[Array, Array, Array, Array | float]:
         """Return output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
         mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
-        force, elastic = LoadCells.of(values).true_input(data["input_force"]), self.cable.elasticity
+        force, elastic = LoadCells.of(values).true_input(data.input_force), self.cable.elasticity
         rope = elastic.loop_rope(values)
-        if "cases" in data:
-            exponent = self.cable.friction_exponent(values, data["cases"]) + mounting
-            preload = elastic.preload(values, jnp.sum(data["cases"], axis=-1))[0]
+        if data.cases is not None:
+            exponent = self.cable.friction_exponent(values, data.cases) + mounting
+            preload = elastic.preload(values, jnp.sum(data.cases, axis=-1))[0]
             per_case = jnp.stack([exponent, preload, jnp.exp(-exponent), jnp.exp(exponent)])
-            exponent, preload, less, more = per_case @ data["spread"]
-            preload = moving_preload(data["stroke"] * force, preload, exponent, rope)
-            return *loop_response_from(force, 2 * preload * exponent, 2 * preload, less, more, data["stroke"]), 0.0
-        angles, variance = resolve_angles(self.cable, values, data)
+            exponent, preload, less, more = per_case @ data.spread
+            preload = moving_preload(data.stroke * force, preload, exponent, rope)
+            return *loop_response_from(force, 2 * preload * exponent, 2 * preload, less, more, data.stroke), 0.0
+        angles, variance = resolve_angles(self.cable, values, data.angles)
         exponent = self.cable.friction_exponent(values, angles) + mounting
         of_cable = elastic.preload(values, jnp.sum(angles, axis=-1))[0]
-        preload = jnp.where(data["has_preload"], data["preload"], of_cable)
-        response = loop_response(force, preload, exponent, data["stroke"], rope)
+        preload = jnp.where(data.has_preload, data.preload, of_cable)
+        response = loop_response(force, preload, exponent, data.stroke, rope)
         return *response, self.cable.exponent_variance(values, angles, variance)
 
     def _mean_and_sd(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
+        self, values: Mapping[str, Array], data: LoopData, weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         output, by_force, by_exponent, angle_variance = self._response(values, data)
         if weights is not values:
@@ -97,44 +123,40 @@ class LoopTerm:
         variance = weights[FORCE_NOISE] ** 2 * (1 + (noise_ratio * by_force) ** 2)
         return LoadCells.of(values).shown_output(output), jnp.sqrt(variance + by_exponent**2 * angle_variance)
 
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def expected(self, values: Mapping[str, Array], data: LoopData) -> Float[Array, " rows"]:
         """Expected output forces [N]."""
         return self._mean_and_sd(values, data, values)[0]
 
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def log_likelihood(self, values: Mapping[str, Array], data: LoopData) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
         law = noise_law(self.cable.description)
-        return law.log_density(data["output_force"], *self._mean_and_sd(values, data, values))
+        return law.log_density(data.output_force, *self._mean_and_sd(values, data, values))
 
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def residuals(self, values: Mapping[str, Array], data: LoopData) -> Float[Array, " rows"]:
         """Standardized residuals; the weights follow the parameters but are not differentiated."""
         mean, sd = self._mean_and_sd(values, data, jax.lax.stop_gradient(dict(values)))
-        return noise_law(self.cable.description).residual((data["output_force"] - mean) / jax.lax.stop_gradient(sd))
+        return noise_law(self.cable.description).residual((data.output_force - mean) / jax.lax.stop_gradient(sd))
 
-    def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " rows"]:
+    def simulate(self, values: Mapping[str, Array], data: LoopData, key: Array) -> Float[Array, " rows"]:
         """Output forces as the bench would give them [N]."""
         mean, sd = self._mean_and_sd(values, data, values)
         return mean + sd * scatter(key, mean.shape, self.cable.description)
 
     def observed(self) -> np.ndarray:
         """Measured output forces [N]."""
-        return self.data["output_force"]
+        return self.data.output_force
 
 
 def make_loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
     """Return the term of a loop table."""
     rows = collect_row_angles(cable.description, table, angles)
-    data = rows.data | {
-        "input_force": table.input_force,
-        "output_force": table.output_force,
-        "stroke": table.stroke.astype(float),
-        "preload": np.nan_to_num(table.preload),
-        "has_preload": np.isfinite(table.preload),
-    }
-    known = rows.is_own.all() and not rows.known_sd.any() and not rows.has_angle_noise.any()
-    if known and not data["has_preload"].any():  # friction and preload are worked out once for every different case
-        data["cases"], at = np.unique(rows.own, axis=0, return_inverse=True)
-        data["spread"] = spread_matrix(at.ravel())
+    has_preload = np.isfinite(table.preload)
+    forces = table.input_force, table.output_force, table.stroke.astype(float)
+    data = LoopData(rows, *forces, np.nan_to_num(table.preload), has_preload)
+    if rows.is_own.all() and rows.is_exact and not has_preload.any():
+        # Friction and preload are worked out once for every different case.
+        cases, case = np.unique(rows.own, axis=0, return_inverse=True)
+        data = replace(data, cases=cases, spread=spread_matrix(case.ravel()))
     return LoopTerm(cable, data, tuple(table.origin.describe_row(i) for i in range(len(table.stroke))))
 
 

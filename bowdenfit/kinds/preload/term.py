@@ -1,8 +1,7 @@
 """Preload tables in the likelihood: the tension between fixed ends, at wrap angles."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -37,9 +36,26 @@ from bowdenfit.kinds.term import (
 )
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.types import DataArray
 
 MEASURED_PRELOAD = "measured_preload"  # not the name of the parameter
 PRELOAD_NOISE = "sigma_P"
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class PreloadData:
+    """Arrays of a table of preload.
+
+    Args:
+        reading: Preload of taut rows [N], (read); NaN where there is none.
+        at_most: Zeros of slack rows [N], (bounds); NaN where there is none.
+        wrap_angle: Total wrap angle of the taut rows, then of the slack ones [rad], (rows).
+    """
+
+    reading: DataArray
+    at_most: DataArray
+    wrap_angle: DataArray
 
 
 class PreloadTerm(IndependentReadings):
@@ -48,7 +64,7 @@ class PreloadTerm(IndependentReadings):
     .. math:: P_i \sim \text{Normal}(P(\theta_i),\ \sigma_P)
 
     A preload of 0 is what a load cell says of a slack rope whatever its noise: such a row is known to be at most 0, and
-    contributes :math:`\Phi(-P(\theta)/\sigma_P)`. These rows come last; "at_most" of the data holds their zeros.
+    contributes :math:`\Phi(-P(\theta)/\sigma_P)`. These rows come last; `at_most` of the data holds their zeros.
     """
 
     name = MEASURED_PRELOAD
@@ -59,61 +75,61 @@ class PreloadTerm(IndependentReadings):
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
         """A block of readings that scatter alike, and one of bounds, which have no scatter."""
-        read = len(self.data["reading"])
+        read = len(self.data.reading)
         return ((read, read), (len(self.labels) - read, 0))
 
     @property
-    def padded(self) -> dict[str, Any]:
+    def padded(self) -> PreloadData:
         """See `LogDensity.padded`: every row as one that was read and as one that is known to be at most 0."""
-        none_read, none_bound = (np.full(len(self.data[name]), np.nan) for name in ("at_most", "reading"))
-        reading, at_most = [self.data["reading"], none_read], [none_bound, self.data["at_most"]]
-        return self.data | {"reading": np.concatenate(reading), "at_most": np.concatenate(at_most)}
+        data: PreloadData = self.data
+        none_read, none_bound = np.full(len(data.at_most), np.nan), np.full(len(data.reading), np.nan)
+        reading, at_most = np.concatenate([data.reading, none_read]), np.concatenate([none_bound, data.at_most])
+        return replace(data, reading=reading, at_most=at_most)
 
     @override
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-        return self.cable.elasticity.preload(values, data["wrap_angle"])[0]
+    def expected(self, values: Mapping[str, Array], data: PreloadData) -> Float[Array, " rows"]:
+        return self.cable.elasticity.preload(values, data.wrap_angle)[0]
 
     def _deviations(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
+        self, values: Mapping[str, Array], data: PreloadData, noise: Array
     ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
         """Return standardized deviations of the readings, and of those that are only known to be at most 0."""
         expected = self.expected(values, data)
-        return deviations_of_readings(data["reading"], expected) / noise, deviations_of_bounds(
-            data["at_most"], expected
+        return deviations_of_readings(data.reading, expected) / noise, deviations_of_bounds(
+            data.at_most, expected
         ) / noise
 
     @override
-    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def log_likelihood(self, values: Mapping[str, Array], data: PreloadData) -> Float[Array, " rows"]:
         deviation, u = self._deviations(values, data, values[self.noise])
         law = noise_law(self.cable.description)
         read = law.log_density(deviation) - jnp.log(values[self.noise])
-        return join_contributions((data["reading"], read), (data["at_most"], law.log_cdf(u)))
+        return join_contributions((data.reading, read), (data.at_most, law.log_cdf(u)))
 
     @override
-    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def residuals(self, values: Mapping[str, Array], data: PreloadData) -> Float[Array, " rows"]:
         """Standardized residuals; sqrt(-2 log likelihood) for rows known to be at most 0."""
         deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
         law = noise_law(self.cable.description)
-        return join_contributions((data["reading"], law.residual(deviation)), (data["at_most"], law.bound_residual(u)))
+        return join_contributions((data.reading, law.residual(deviation)), (data.at_most, law.bound_residual(u)))
 
     @override
     def simulate(
-        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+        self, values: Mapping[str, Array], data: PreloadData, key: Array, scale: float = 1.0
     ) -> Float[Array, " rows"]:
         return jnp.maximum(super().simulate(values, data, key, scale), 0.0)
 
     @override
     def observed(self) -> np.ndarray:
-        return np.concatenate([self.data["reading"], self.data["at_most"]])
+        return np.concatenate([self.data.reading, self.data.at_most])
 
 
 def make_preload_term(cable: Cable, table: PreloadTable) -> PreloadTerm:
     """Return the term of a table of preload; rows that read 0 come last."""
     slack = table.preload == 0
     angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
-    data = {"reading": table.preload[~slack], "at_most": table.preload[slack], "wrap_angle": angles}
     labels = tuple(f"{np.rad2deg(angle):.4g} deg" for angle in angles)
-    return PreloadTerm(cable, data, labels)
+    return PreloadTerm(cable, PreloadData(table.preload[~slack], table.preload[slack], angles), labels)
 
 
 class PreloadCandidates(CandidateKind):
@@ -167,4 +183,4 @@ class PreloadTerms(TermKind[PreloadTable]):
 
     @override
     def covariates(self, table: PreloadTable, term: Term) -> Mapping[str, np.ndarray]:
-        return {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])}
+        return {WRAP_ANGLE: np.rad2deg(term.data.wrap_angle)}

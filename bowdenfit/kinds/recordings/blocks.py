@@ -20,7 +20,8 @@ import numpy as np
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import LoopDrive, RopeDrive
 from bowdenfit.description import Description
-from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, expected_forces
+from bowdenfit.kinds.row_angles import RowAngles
+from bowdenfit.kinds.sliding_rows import expected_forces
 from bowdenfit.recordings.preparation.hysteresis import smooth_input, white_noise
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.types import Labels, Vector
@@ -265,14 +266,17 @@ def group_blocks(recording: Recording) -> BlockGroups:
 
 
 def stack_recordings(
-    recordings: Recordings, parts: Sequence[Mapping[str, Any]], angles: Mapping[str, np.ndarray]
+    recordings: Recordings, parts: Sequence[Mapping[str, Any]], angles: RowAngles
 ) -> dict[str, Any]:
     """Stack recordings into arrays over time and recordings; the shorter ones stand still at their end, with no weight.
 
     Args:
         recordings: The recordings.
         parts: Arrays of each: those of `BlockGroups.arrays`, and the weight.
-        angles: `ROW_ARRAYS` of each.
+        angles: Wrap angles of each.
+
+    Returns:
+        The fields of `BlocksData`, by name.
     """
     runs = recordings.runs
     run = np.array([runs.index(r.run) for r in recordings.items])
@@ -282,10 +286,8 @@ def stack_recordings(
     readings = np.minimum(n_effective, 1.0)  # blocks that are joined are one reading, however well it is known
     ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, readings, 1.0)
     log_weights = np.where(counted, readings * np.log(ratio), 0.0)
-    arrays = (
-        {name: angles[name] for name in ROW_ARRAYS} | {name: pad_columns([p[name] for p in parts]) for name in _HELD} | free
-    )
-    return arrays | {
+    return free | {name: pad_columns([p[name] for p in parts]) for name in _HELD} | {
+        "angles": angles,
         "run": run,
         "n": np.bincount(run, readings.sum(axis=0)),
         "log_weights": np.bincount(run, log_weights.sum(axis=0)),

@@ -48,7 +48,7 @@ from bowdenfit.kinds.recordings.whole_recordings import (
     make_loop_recordings_term,
     stack_rope_recordings,
 )
-from bowdenfit.kinds.row_angles import collect_row_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import (
     declare_noise_of_forces,
@@ -56,7 +56,7 @@ from bowdenfit.kinds.shared_parameters import (
     declare_preload,
     declare_run_scatter,
 )
-from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
+from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
@@ -120,7 +120,7 @@ class RecordingTerms(TermKind[Recordings]):
             return super().events(term, description)
         settings = description.table(RecordingsTable)
         whole = float(settings is not None and settings.likelihood == "whole")
-        return np.column_stack([term.data["n"], np.full(len(term.labels), 2.0 if isinstance(term, TurnsTerm) else whole)])
+        return np.column_stack([term.data.n, np.full(len(term.labels), 2.0 if isinstance(term, TurnsTerm) else whole)])
 
     @override
     def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
@@ -153,7 +153,7 @@ def make_recordings_term(
         DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
     """
     settings = cable.description.table(RecordingsTable)
-    rows = collect_row_angles(cable.description, angles_of_recordings(recordings), angles).data
+    rows = collect_row_angles(cable.description, angles_of_recordings(recordings), angles)
     labels = tuple(_run_label(cable, recordings, run) for run in recordings.runs)
     if recordings.loop:
         censored = settings is not None and _is_censored(settings, recordings)
@@ -253,7 +253,7 @@ def _follow_in_parts(
     return followed, np.stack([state, last])
 
 
-def _make_sliding_rows(recordings: Recordings, parts: list[SelectedBlocks], angles: Mapping[str, np.ndarray]) -> SlidingRows:
+def _make_sliding_rows(recordings: Recordings, parts: list[SelectedBlocks], angles: RowAngles) -> SlidingRows:
     """Return the blocks of all recordings as rows of runs."""
     of_recording = np.repeat(np.arange(len(parts)), [len(p.used) for p in parts])
     runs = recordings.runs
@@ -271,7 +271,7 @@ def _make_sliding_rows(recordings: Recordings, parts: list[SelectedBlocks], angl
         np.concatenate([r.blocks.velocity[p.used] for r, p in pairs]),
         np.concatenate([p.stroke * output_drift(r)[p.used] for r, p in pairs]),
         concatenate("n_effective"),
-        {name: angles[name][of_recording] for name in ROW_ARRAYS},
+        angles.select(of_recording),
         concatenate("information"),
     )
 

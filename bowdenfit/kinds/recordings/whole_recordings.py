@@ -6,8 +6,8 @@ is linearized, and in the reading of a run in results: an efficiency of a rope, 
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -28,19 +28,19 @@ from bowdenfit.kinds.recordings.blocks import (
     smooth_forces,
     stack_recordings,
 )
-from bowdenfit.kinds.row_angles import resolve_angles
-from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
+from bowdenfit.kinds.row_angles import RowAngles, resolve_angles
 from bowdenfit.kinds.term import round_up_count
 from bowdenfit.physics.distributions import log_normal_cdf
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.recordings.loop_strokes import loop_limits
 from bowdenfit.recordings.recording import Recording, Recordings
+from bowdenfit.types import DataArray
 
 _LEAST_TOTAL = 1e-20  # information of a run on its mounting effect, to keep 0 / 0 finite
 
 Values = Mapping[str, Array]
-Data = Mapping[str, Any]
+Data: TypeAlias = Any  # a `BlocksData`
 
 
 # Largest correction of the first guess of a mounting effect, over the friction exponent; a judgement.
@@ -68,6 +68,81 @@ class MountingEffects:
     total: Array
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class BlocksData:
+    """Blocks of recordings side by side; the shorter ones stand still at their end, without weight.
+
+    Args:
+        angles: Wrap angles of the recordings.
+        run: Number of the run, (recordings).
+        n: How many independent readings it counts for [1], (runs).
+        log_weights: Sum of the logarithms of weights, (runs).
+        input_force, output_force: Forces [N], (blocks, recordings).
+        likely_force: Input force without noise [N], (blocks, recordings).
+        input_noise: Noise of the input that is in the output as well [N], (blocks, recordings).
+        velocity: Velocity, (blocks, recordings).
+        weight: Information on the reading at unit noise, (blocks, recordings).
+        drift: Change of the reading with a delay [1/s], (blocks, recordings).
+        restart: Whether the operator starts anew there, (blocks, recordings).
+        censored: +1 or -1 where the output is only known to lie beyond an end of the range, else 0, (blocks, recordings).
+        share: Weight of that bound, (blocks, recordings).
+        reading: Output on the scale of the likelihood, (blocks, recordings).
+        newtons: Change of the output force with that [N], (blocks, recordings).
+        exponent: Friction exponent by the recording itself [1], (recordings).
+    """
+
+    angles: RowAngles
+    run: DataArray
+    n: DataArray
+    log_weights: DataArray
+    input_force: DataArray
+    output_force: DataArray
+    likely_force: DataArray
+    input_noise: DataArray
+    velocity: DataArray
+    weight: DataArray
+    drift: DataArray
+    restart: DataArray
+    censored: DataArray
+    share: DataArray
+    reading: DataArray
+    newtons: DataArray
+    exponent: DataArray
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class RopeBlocksData(BlocksData):
+    """Blocks of recordings of a single rope.
+
+    Args:
+        speed: Mean speed while it slides, (recordings).
+        step: Time since the block before [s], (blocks, recordings).
+    """
+
+    speed: DataArray
+    step: DataArray
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LoopBlocksData(BlocksData):
+    """Blocks of recordings of a loop.
+
+    Args:
+        moving: Share of a block in its run's mean lost force, with the sign of the motion, (blocks, recordings).
+        loss: Force lost by the recording itself [N], (recordings).
+        tells_loss: Whether that is known, (recordings).
+        tells_exponent: Whether the friction exponent is, (recordings).
+    """
+
+    moving: DataArray
+    loss: DataArray
+    tells_loss: DataArray
+    tells_exponent: DataArray
+
+
 @dataclass(frozen=True)
 class BlocksTerm(ABC):
     r"""Likelihood of every block of whole recordings, one value a run.
@@ -79,12 +154,12 @@ class BlocksTerm(ABC):
 
     Args:
         cable: The cable.
-        data: Arrays over time and recordings (forces, velocity, weight), over recordings and over runs.
+        data: Its arrays.
         labels: Each run in words.
     """
 
     cable: Cable = field(repr=False)
-    data: dict[str, Any] = field(repr=False)
+    data: Data = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     noise: str = RUN_SCATTER
     reading_noise: str = BLOCK_NOISE
@@ -96,49 +171,50 @@ class BlocksTerm(ABC):
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
         """Runs, which scatter by their mounting, and blocks, which scatter about their run by the load cells."""
-        runs, blocks = len(self.labels), int(np.sum(self.data["n"]))
-        return ((runs, runs), (self.data["weight"].size, max(blocks - runs, 1)))
+        runs, blocks = len(self.labels), int(np.sum(self.data.n))
+        return ((runs, runs), (self.data.weight.size, max(blocks - runs, 1)))
 
     @property
-    def padded(self) -> dict[str, Any]:
+    def padded(self) -> BlocksData:
         """See `LogDensity.padded`: recordings that stand still for longer at their end, with no weight."""
-        blocks = len(self.data["weight"])
-        missing = ((0, round_up_count(blocks) - blocks), (0, 0))
-        long = {
-            name: np.pad(values, missing, "constant" if name in WITHOUT_WEIGHT else "edge")
-            for name, values in self.data.items()
-            if np.ndim(values) == 2 and name not in ROW_ARRAYS
+        data: BlocksData = self.data
+        missing = round_up_count(len(data.weight)) - len(data.weight)
+        modes: dict[bool, Literal["constant", "edge"]] = {True: "constant", False: "edge"}
+        long: dict[str, Any] = {
+            name: np.pad(values, ((0, missing), *((0, 0),) * (values.ndim - 1)), modes[name in WITHOUT_WEIGHT])
+            for name, values in vars(data).items()
+            if isinstance(values, np.ndarray) and values.ndim > 1
         }
-        return self.data | long
+        return replace(data, **long)
 
     def _per_run(self, data: Data, blocks: PerTime) -> Float[Array, " runs"]:
         """Return the sum over the blocks of each run."""
-        return jnp.zeros_like(data["n"]).at[data["run"]].add(jnp.sum(blocks, axis=0))
+        return jnp.zeros_like(data.n).at[data.run].add(jnp.sum(blocks, axis=0))
 
     def _drive(self, values: Values, data: Data) -> tuple[Any, Array, Array]:
         """Return the cable at each recording's conditions, its wrap angles and their variances."""
-        angles, variance = resolve_angles(self.cable, values, data)
-        drive = make_drive(self.cable, values, angles, data["velocity"], step=data.get("step", 0.0))
+        angles, variance = resolve_angles(self.cable, values, data.angles)
+        drive = make_drive(self.cable, values, angles, data.velocity, step=getattr(data, "step", 0.0))
         return drive, angles, variance
 
     def _follow(
         self, drive: RopeDrive | LoopDrive, cells: LoadCells, data: Data, mounting: PerRecording
     ) -> tuple[PerTime, PerTime]:
         """Return deviations of the readings from the operator's output, and the output's derivative by the exponent."""
-        stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
-        force = cells.true_input(data["likely_force"], drive.least_force)
-        anew = jnp.where(data["restart"], stands, jnp.nan)
-        followed = drive.follow(force, mounting, stands[0], anew, data["input_noise"])
+        stands = drive.scaled(cells.true_output(data.output_force, drive.least_force))
+        force = cells.true_input(data.likely_force, drive.least_force)
+        anew = jnp.where(data.restart, stands, jnp.nan)
+        followed = drive.follow(force, mounting, stands[0], anew, data.input_noise)
         expected, loading = drive.shown(cells, *followed)
-        return data["reading"] + cells.late(data["drift"]) - expected, loading
+        return data.reading + cells.late(data.drift) - expected, loading
 
     def _deviations(self, values: Values, data: Data, weights: Values) -> MountingEffects:
         """Return the mounting effects, and the deviations of the blocks from them."""
         (drive, angles, variance), cells = self._drive(values, data), LoadCells.of(values)
         guess, reach = self._first_guess(drive, data)
         deviation, loading = self._follow(drive, cells, data, guess)
-        by_recording = jnp.sum(data["weight"] * loading**2, axis=0)
-        step = jnp.sum(data["weight"] * loading * deviation, axis=0) / jnp.maximum(by_recording, 1e-30)
+        by_recording = jnp.sum(data.weight * loading**2, axis=0)
+        step = jnp.sum(data.weight * loading * deviation, axis=0) / jnp.maximum(by_recording, 1e-30)
         guess = guess + jnp.clip(step, -reach, reach)
         deviation, loading = self._follow(drive, cells, data, guess)
         of_angles = self.cable.exponent_variance(weights, angles, variance)
@@ -157,24 +233,24 @@ class BlocksTerm(ABC):
             of_angles: Variance of each recording's friction exponent by its wrap angles.
         """
         # Blocks that no friction of this size can explain have no information on the effect: the limit, instead of 0 / 0.
-        total = jnp.maximum(self._per_run(data, data["weight"] * loading**2), _LEAST_TOTAL)
-        effect = self._per_run(data, data["weight"] * loading * deviation) / total
-        from_angles = self._per_run(data, data["weight"] * loading**2 * of_angles) / total
+        total = jnp.maximum(self._per_run(data, data.weight * loading**2), _LEAST_TOTAL)
+        effect = self._per_run(data, data.weight * loading * deviation) / total
+        from_angles = self._per_run(data, data.weight * loading**2 * of_angles) / total
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
-        return MountingEffects(deviation - loading * effect[data["run"]], effect, sd, total)
+        return MountingEffects(deviation - loading * effect[data.run], effect, sd, total)
 
     def _excess_over_limit(self, data: Data, effects: MountingEffects, noise: Array) -> PerTime:
         """Return how far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
-        return data["censored"] * -effects.within * data["newtons"] / noise
+        return data.censored * -effects.within * data.newtons / noise
 
     def log_likelihood(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Log likelihood of each run, all blocks together; these scatter normally about the run."""
-        effects, noise, n = self._deviations(values, data, values), values[self.reading_noise], data["n"]
-        squares = self._per_run(data, data["weight"] * effects.within**2)
-        constant = (data["log_weights"] - jnp.log(effects.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
+        effects, noise, n = self._deviations(values, data, values), values[self.reading_noise], data.n
+        squares = self._per_run(data, data.weight * effects.within**2)
+        constant = (data.log_weights - jnp.log(effects.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
         inside = constant - (n - 1) * jnp.log(noise) - squares / (2 * noise**2)
-        log_probability = log_normal_cdf(self._excess_over_limit(data, effects, noise)) * data["share"]
-        censored = self._per_run(data, jnp.where(data["censored"] != 0, log_probability, 0.0))
+        log_probability = log_normal_cdf(self._excess_over_limit(data, effects, noise)) * data.share
+        censored = self._per_run(data, jnp.where(data.censored != 0, log_probability, 0.0))
         return inside + noise_law(self.cable.description).log_density(effects.effect, 0.0, effects.sd) + censored
 
     def residuals(self, values: Values, data: Data) -> Float[Array, " runs_and_blocks"]:
@@ -182,10 +258,10 @@ class BlocksTerm(ABC):
         effects = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
         noise = jax.lax.stop_gradient(values[self.reading_noise])
         beyond = self._excess_over_limit(data, effects, noise)
-        inside = jnp.sqrt(data["weight"]) * effects.within / noise
+        inside = jnp.sqrt(data.weight) * effects.within / noise
         # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
-        root = jnp.sqrt(-2 * data["share"] * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
-        censored = jnp.where((data["censored"] != 0) & (beyond < 30.0), root, 0.0)
+        root = jnp.sqrt(-2 * data.share * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
+        censored = jnp.where((data.censored != 0) & (beyond < 30.0), root, 0.0)
         between = noise_law(self.cable.description).residual(effects.effect / jax.lax.stop_gradient(effects.sd))
         return jnp.concatenate([between, (inside + censored).ravel()])
 
@@ -207,12 +283,12 @@ class WholeRecordingsTerm(BlocksTerm):
     def _first_guess(self, drive: RopeDrive, data: Data) -> tuple[PerRecording, PerRecording]:
         guess = jnp.zeros_like(drive.exponent)
         if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
-            guess = data["exponent"] - self._typical_exponent(drive, data)
-        return guess, _ROPE_REACH * jnp.asarray(data["exponent"])
+            guess = data.exponent - self._typical_exponent(drive, data)
+        return guess, _ROPE_REACH * jnp.asarray(data.exponent)
 
     def _typical_exponent(self, drive: RopeDrive, data: Data) -> PerRecording:
         """Return the friction exponent of each recording at its mean speed [1]."""
-        return drive.exponent * drive.friction.rate(drive.values, data["speed"])
+        return drive.exponent * drive.friction.rate(drive.values, data.speed)
 
     def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Expected efficiency of each run, the effect of its mounting left out [1]."""
@@ -226,24 +302,24 @@ class WholeRecordingsTerm(BlocksTerm):
 
     def _average_by_run(self, of_recording: Array) -> Array:
         """Return the mean over the recordings of each run."""
-        run, runs = jnp.asarray(self.data["run"]), len(self.labels)
+        run, runs = jnp.asarray(self.data.run), len(self.labels)
         counts = jnp.zeros(runs).at[run].add(1.0)
         return jnp.zeros(runs).at[run].add(of_recording) / counts
 
     def observed(self) -> np.ndarray:
         """Efficiency of each run by the width of its own hysteresis loop [1]."""
-        run, exponent = self.data["run"], self.data["exponent"]
+        run, exponent = self.data.run, self.data.exponent
         return np.exp(-np.bincount(run, exponent) / np.bincount(run))
 
 
 def stack_rope_recordings(
     recordings: Recordings,
-    angles: Mapping[str, np.ndarray],
+    angles: RowAngles,
     censored: bool,
     noise_ratio: float,
     *,
     counts_turns: bool = False,
-) -> dict[str, Any]:
+) -> RopeBlocksData:
     """Stack recordings of a rope into arrays over time and recordings; shorter ones stand still at their end, without weight.
 
     The noise ratio is that of the input over that of the output; for `counts_turns` see `BlockGroups.arrays`.
@@ -251,13 +327,14 @@ def stack_rope_recordings(
     parts = [_rope_blocks(r, censored, noise_ratio, counts_turns) for r in recordings.items]
     data = stack_recordings(recordings, parts, angles)
     speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.items]
-    return data | {
-        "reading": np.log(data["output_force"]),
-        "newtons": data["output_force"],
-        "exponent": np.array([r.strokes.exponent for r in recordings.items]),
-        "speed": np.array([float(speed.mean()) if len(speed) else float("nan") for speed in speeds]),
-        "step": pad_columns([part["step"] for part in parts], "constant"),
-    }
+    return RopeBlocksData(
+        **data,
+        reading=np.log(data["output_force"]),
+        newtons=data["output_force"],
+        exponent=np.array([r.strokes.exponent for r in recordings.items]),
+        speed=np.array([float(speed.mean()) if len(speed) else float("nan") for speed in speeds]),
+        step=pad_columns([part["step"] for part in parts], "constant"),
+    )
 
 
 def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float, counts_turns: bool) -> dict[str, Any]:
@@ -289,20 +366,20 @@ class LoopRecordingsTerm(BlocksTerm):
     def _first_guess(self, drive: LoopDrive, data: Data) -> tuple[PerRecording, PerRecording]:
         """That with which the loop is as wide as the recording's own; none where that is not known."""
         least = _LEAST_PRELOAD * self.cable.friction.conditions.load.value
-        by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, least))
-        own = jnp.where(data["tells_loss"], jnp.minimum(by_loss, _LARGEST_EXPONENT), data["exponent"])
-        guess = jnp.where(data["tells_loss"] | data["tells_exponent"], own - drive.exponent, 0.0)
+        by_loss = data.loss / (2 * jnp.maximum(drive.preload, least))
+        own = jnp.where(data.tells_loss, jnp.minimum(by_loss, _LARGEST_EXPONENT), data.exponent)
+        guess = jnp.where(data.tells_loss | data.tells_exponent, own - drive.exponent, 0.0)
         return guess, _LOOP_REACH * (drive.exponent + guess)
 
     def _mean_lost_force(
         self, values: Values, data: Data, drive: LoopDrive, more: PerRecording | float = 0.0
     ) -> Float[Array, " runs"]:
         """Return the mean force lost in moving blocks [N], with `more` friction exponent than the cable's."""
-        cells, force = LoadCells.of(values), data["input_force"]
-        stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
+        cells, force = LoadCells.of(values), data.input_force
+        stroke = jnp.sign(data.moving)  # which also holds the weight of each block
         exponent = (drive.exponent + more)[None, :]
         output = loop_output_force(cells.true_input(force), drive.preload[None, :], exponent, stroke, drive.rope)
-        return self._per_run(data, data["moving"] * (force - cells.shown_output(output)))
+        return self._per_run(data, data.moving * (force - cells.shown_output(output)))
 
     def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Expected mean force lost while each run moves, the effect of its mounting left out [N]."""
@@ -321,19 +398,19 @@ class LoopRecordingsTerm(BlocksTerm):
 
     def observed(self) -> np.ndarray:
         """Mean force lost while each run moved [N]."""
-        lost = self.data["moving"] * (self.data["input_force"] - self.data["output_force"])
-        return np.bincount(self.data["run"], lost.sum(axis=0))
+        lost = self.data.moving * (self.data.input_force - self.data.output_force)
+        return np.bincount(self.data.run, lost.sum(axis=0))
 
 
 def make_loop_recordings_term(
-    cable: Cable, recordings: Recordings, angles: Mapping[str, np.ndarray], labels: tuple[str, ...], censored: bool
+    cable: Cable, recordings: Recordings, angles: RowAngles, labels: tuple[str, ...], censored: bool
 ) -> LoopRecordingsTerm:
     """Return the term of a loop's recordings.
 
     Args:
         cable: The cable.
         recordings: Its recordings.
-        angles: `ROW_ARRAYS` of each recording.
+        angles: Wrap angles of each recording.
         labels: Each run in words.
         censored: Whether a saturated output counts as one beyond the end of the range.
     """
@@ -343,20 +420,17 @@ def make_loop_recordings_term(
     moving = pad_columns([p["moving"] for p in parts], "constant")
     of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
     loss, exponent = (np.array([getattr(r.strokes, name) for r in recordings.items]) for name in ("drag", "exponent"))
-    return LoopRecordingsTerm(
-        cable,
-        data
-        | {
-            "reading": data["output_force"],
-            "newtons": np.ones_like(data["output_force"]),
-            "moving": moving / np.maximum(of_run, 1)[data["run"]],
-            "loss": np.nan_to_num(loss),
-            "tells_loss": np.isfinite(loss),
-            "exponent": np.nan_to_num(exponent),
-            "tells_exponent": np.isfinite(exponent),
-        },
-        labels,
+    blocks = LoopBlocksData(
+        **data,
+        reading=data["output_force"],
+        newtons=np.ones_like(data["output_force"]),
+        exponent=np.nan_to_num(exponent),
+        moving=moving / np.maximum(of_run, 1)[data["run"]],
+        loss=np.nan_to_num(loss),
+        tells_loss=np.isfinite(loss),
+        tells_exponent=np.isfinite(exponent),
     )
+    return LoopRecordingsTerm(cable, blocks, labels)
 
 
 def _loop_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """Ring-downs in the likelihood: the free vibration of the joint against the rope, read with noise."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +17,7 @@ from bowdenfit.kinds.term import Circumstances, IndependentReadings, Term, TermK
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.ring_down import ring_down
+from bowdenfit.types import DataArray
 
 INERTIA, STIFFNESS, DAMPING, FRICTION = "ring_inertia", "ring_stiffness", "rope_damping", "ring_friction"
 NOISE = "sigma_ringdown"
@@ -39,6 +39,28 @@ def run_parameter_name(name: str, run: int) -> str:
     return f"ring_{name}_{run + 1}"
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class RingDownData:
+    """Arrays of a table of ring-downs.
+
+    Args:
+        reading: Angles [rad] or torques [N m], (rows).
+        time: Time of each row [s], (rows).
+        run: Number of each row's run, (rows).
+        added: Inertia added in each run [kg m^2], (runs).
+        torque: 1 where torques were read, else 0, (runs).
+        swings: Zeros, one for each half swing that is followed, (half swings).
+    """
+
+    reading: DataArray
+    time: DataArray
+    run: DataArray
+    added: DataArray
+    torque: DataArray
+    swings: DataArray
+
+
 class RingDownTerm(IndependentReadings):
     r"""Likelihood of a table of ring-downs: angles [rad], or torques :math:`K x + b_c \dot x` in the rope [N m].
 
@@ -52,29 +74,26 @@ class RingDownTerm(IndependentReadings):
     @property
     def unit(self) -> str:
         """Unit of the readings: of angles or of torques."""
-        return "N m" if np.any(self.data["torque"] > 0) else "rad"
+        return "N m" if np.any(self.data.torque > 0) else "rad"
 
     @override
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
-        run, n = data["run"], len(data["added"])
+    def expected(self, values: Mapping[str, Array], data: RingDownData) -> Float[Array, " rows"]:
+        run, n = data.run, len(data.added)
         amplitude, at_rest, release = (
             jnp.stack([values[run_parameter_name(name, i)] for i in range(n)]) for name in ("amplitude", "rest", "release")
         )
         stiffness, damping = values[STIFFNESS], values[DAMPING]
         angle, speed = ring_down(
-            data["time"] - release[run], run, amplitude, values[INERTIA] + data["added"], stiffness, damping,
-            values[FRICTION], len(data["swings"]),
+            data.time - release[run], run, amplitude, values[INERTIA] + data.added, stiffness, damping,
+            values[FRICTION], len(data.swings),
         )  # fmt: skip
-        return at_rest[run] + jnp.where(data["torque"][run] > 0, stiffness * angle + damping * speed, angle)
+        return at_rest[run] + jnp.where(data.torque[run] > 0, stiffness * angle + damping * speed, angle)
 
 
 def make_ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
     """Return the term of a table of ring-downs."""
-    swings = _sampling(table)[1]
-    data = {
-        "reading": table.reading, "time": table.time, "run": table.run, "added": table.added,
-        "torque": np.full(len(table.added), float(table.is_torque)), "swings": np.zeros(swings),
-    }  # fmt: skip
+    torque, swings = np.full(len(table.added), float(table.is_torque)), np.zeros(_sampling(table)[1])
+    data = RingDownData(table.reading, table.time, table.run, table.added, torque, swings)
     labels = tuple(f"{1000 * time:.4g} ms" for time in table.time)
     return RingDownTerm(cable, data, labels)
 
@@ -226,4 +245,4 @@ class RingDownTerms(TermKind[RingDownTable]):
 
     @override
     def covariates(self, table: RingDownTable, term: Term) -> Mapping[str, np.ndarray]:
-        return {"Time (s)": np.asarray(term.data["time"])}
+        return {"Time (s)": np.asarray(term.data.time)}

@@ -1,7 +1,7 @@
 """Stretch tables in the likelihood: how far the rope gives at its loaded end, under loads and at wrap angles."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import jax
 import numpy as np
@@ -10,7 +10,7 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, spread_matrix
+from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, StretchRows, spread_matrix
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -26,9 +26,22 @@ from bowdenfit.kinds.tables import AngleTable, StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, IndependentReadings, Term, TermKind, Truth
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, Scale
+from bowdenfit.types import DataArray
 from bowdenfit.words import significant
 
 STRETCH_NOISE = "sigma_L"
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class StretchData(StretchRows):
+    """Arrays of a table of stretch.
+
+    Args:
+        reading: Stretch of each row [mm], (rows).
+    """
+
+    reading: DataArray
 
 
 class StretchTerm(IndependentReadings):
@@ -43,21 +56,16 @@ class StretchTerm(IndependentReadings):
     depends_on_conditions = False  # see `Term`
 
     @override
-    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+    def expected(self, values: Mapping[str, Array], data: StretchData) -> Float[Array, " rows"]:
         return self.cable.elasticity.stretch_of_rows(values, data)
 
 
 def make_stretch_term(cable: Cable, table: StretchTable) -> StretchTerm:
     """Return the term of a table of stretch."""
     angles, at = np.unique(table.wrap_angle, return_inverse=True)
-    data = {
-        "reading": table.stretch,
-        "load": table.load,
-        "wrap_angles": angles,
-        "spread": spread_matrix(at),
-        # A row read while the load grew comes down from no larger one: the two branches meet there.
-        "peak": np.where(table.unloading, table.peak, table.load),
-    }
+    # A row read while the load grew comes down from no larger one: the two branches meet there.
+    peak = np.where(table.unloading, table.peak, table.load)
+    data = StretchData(table.load, peak, angles, spread_matrix(at), table.stretch)
     branch = np.where(table.unloading, ", unloading", "")
     labels = tuple(
         f"{significant(load, 4)} N at {np.rad2deg(angle):.4g} deg{way}"

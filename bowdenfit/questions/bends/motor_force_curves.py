@@ -22,11 +22,7 @@ def collect_motor_forces(fit: Record) -> tuple[MotorForce, ...] | None:
         return None
     path = _fine_path(table)
     both = [
-        {
-            "turns": split_turns_by_depth(way.motion.turns),
-            "angles": term.data["angles"],
-            **reading_arrays(way, np.arange(len(way.run))),
-        }
+        replace(term.data, turns=split_turns_by_depth(way.motion.turns), **reading_arrays(way, np.arange(len(way.run))))
         for way in (path, table)
     ]
 

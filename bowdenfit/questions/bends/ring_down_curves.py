@@ -1,5 +1,6 @@
 """Data of the figure of ring-downs: the fitted free vibration of each run."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ def collect_ring_downs(fit: Record) -> tuple[RingDown, ...] | None:
         return None
     runs, times = range(len(table.added)), [table.time[table.run == run] for run in range(len(table.added))]
     fine = [np.linspace(time[0], time[-1], _RING_POINTS) for time in times]
-    along = term.data | {"time": np.concatenate(fine), "run": np.repeat(np.arange(len(fine)), _RING_POINTS)}
+    along = replace(term.data, time=np.concatenate(fine), run=np.repeat(np.arange(len(fine)), _RING_POINTS))
 
     def curves(values: Values) -> dict[str, Any]:
         return {"along": term.expected(values, along), "read": term.expected(values, term.data)}
@@ -30,7 +31,7 @@ def collect_ring_downs(fit: Record) -> tuple[RingDown, ...] | None:
     fitted = np.median(draws["read"], axis=0)
     ring_downs = []
     for run in runs:
-        curve = scale * quantiles_of_draws(draws["along"][:, along["run"] == run])
+        curve = scale * quantiles_of_draws(draws["along"][:, along.run == run])
         points = times[run], scale * table.reading[table.run == run], scale * fitted[table.run == run]
         ring_downs.append(RingDown(_name_run(table, run), quantity, unit, fine[run], curve, *points))
     return tuple(ring_downs)

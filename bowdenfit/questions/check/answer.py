@@ -155,10 +155,10 @@ def _weakly_identified_noise(fit: Record) -> dict[str, tuple[int, int]]:
 
 def collect_readings(term: Term) -> tuple[np.ndarray, np.ndarray]:
     """Return the readings of a table, upper limits where only these are known, and a mask of such limits."""
-    reading, limit = term.observed().copy(), term.data.get("limit", np.zeros(0))
+    reading, limit = term.observed().copy(), getattr(term.data, "limit", np.zeros(0))
     at_most = np.isnan(reading)
     reading[at_most] = np.rad2deg(limit)
-    bounds = len(term.data.get("at_most", ()))
+    bounds = len(getattr(term.data, "at_most", ()))
     if bounds:
         at_most[len(at_most) - bounds :] = True
     return reading, at_most

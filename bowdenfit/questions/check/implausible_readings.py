@@ -5,6 +5,7 @@ import numpy as np
 from bowdenfit.description import PriorDefaults
 from bowdenfit.kinds import find_kind, find_readings, iterate_tables
 from bowdenfit.kinds.plausibility import GAIN_ERROR, CoarseReadings
+from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.results.record import Record
@@ -77,17 +78,17 @@ def _predicted_readings(fit: Record, term: Term) -> np.ndarray:
 
 def _noise_in_log(fit: Record, term: Term) -> np.ndarray | float:
     """Return what noise of the forces adds to the log of each reading; a mounting cannot take friction below none."""
-    weight, noise = term.data.get("run_weight"), getattr(term, "reading_noise", "")
+    weight, noise = getattr(term.data, "run_weight", None), getattr(term, "reading_noise", "")
     if weight is None:
-        return np.asarray(term.data.get("log_sd", 0.0))
+        return np.asarray(getattr(term.data, "log_sd", 0.0))
     fixed = {p.name: p.fixed for p in fit.model.space.fixed}
     if noise in fixed:
         value = float(fixed[noise] or 0.0)
     elif fit.sampled is not None:
         value = float(np.median(fit.posterior.values[noise]))
     else:
-        cells = np.asarray(term.data["weight"])
-        value = float(np.sqrt(np.sum(term.data["scatter"]) / max(np.sum(term.data["n"]) - np.sum(cells > 0), 1.0)))
+        runs: RunsData = term.data
+        value = float(np.sqrt(np.sum(runs.scatter) / max(np.sum(runs.n) - np.sum(runs.cells.weight > 0), 1.0)))
     return np.asarray(value / np.sqrt(weight))
 
 

@@ -210,14 +210,14 @@ def _step_arrays(
     chosen = list(zip(recordings.items, steps, strict=True))
     drive = LoopDrive if model.cable.is_loop else RopeDrive
     rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s.block] for r, s in chosen]
-    rows = collect_row_angles(model.description, angles_of_recordings(recordings), angles).data
+    rows = collect_row_angles(model.description, angles_of_recordings(recordings), angles)
     held = {
         name: pad_columns([getattr(r.blocks, name)[s.block] for r, s in chosen])
         for name in ("input_force", "output_force", "velocity")
     }
     likely = pad_columns([step.input_force for step in steps])
     times = pad_columns([block_steps(r.blocks.time[s.block]) for r, s in chosen], "constant")
-    return rows | held | {"likely_force": likely, "drift": pad_columns(rates, "constant"), "step": times}
+    return held | {"angles": rows, "likely_force": likely, "drift": pad_columns(rates, "constant"), "step": times}
 
 
 def _make_follow_function(
@@ -226,7 +226,7 @@ def _make_follow_function(
     """Return the output force and exponent as a function of one draw's values, of mounting effects and of the blocks."""
 
     def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
-        angles = resolve_angles(model.cable, values, data)[0]
+        angles = resolve_angles(model.cable, values, data["angles"])[0]
         drive = make_drive(model.cable, values, angles, data["velocity"], step=data["step"])
         cells, least = LoadCells.of(values), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))
@@ -242,7 +242,7 @@ def estimate_run_efficiencies(fit: Record) -> dict[str, tuple[np.ndarray, float,
     assert recordings is not None  # the caller has traces of them
     term = next(t for t in fit.model.terms if t.name == RECORDED)
     observed = term.observed()
-    weight = np.asarray(term.data.get("run_weight", np.full(len(observed), np.nan)), dtype=float)
+    weight = np.asarray(getattr(term.data, "run_weight", np.full(len(observed), np.nan)), dtype=float)
     expected, sigma = fit.least_squares.readings[RECORDED][None], float("nan")
     if posterior is not None:
         expected = np.quantile(posterior.expected[RECORDED], QUANTILES, axis=(0, 1))
@@ -275,11 +275,11 @@ def collect_loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
 def _recording_angles(fit: Record, recordings: Recordings) -> np.ndarray:
     """Return the wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     cable, angles = fit.model.cable, fit.dataset.measurements.table(AngleTable)
-    measured = collect_row_angles(cable.description, angles_of_recordings(recordings), angles).data
+    measured = collect_row_angles(cable.description, angles_of_recordings(recordings), angles)
     middle = {name: np.median(draws, keepdims=True) for name, draws in parameter_values(fit).items()}
 
     def angles_of(values: Mapping[str, jax.Array]) -> jax.Array:
-        return resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in measured.items()})[0]
+        return resolve_angles(cable, values, jax.tree.map(jnp.asarray, measured))[0]
 
     with jax.enable_x64(True):
         angles_by_recording: np.ndarray = for_each_value(angles_of, middle)[0]

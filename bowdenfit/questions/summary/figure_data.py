@@ -1,8 +1,10 @@
 """Data of figures from the model and its draws: a table of forces beside the fitted law, and sampled quantities."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -71,14 +73,15 @@ def _predict_forces(
 ) -> dict[str, np.ndarray]:
     """Return the law at each place, expected outputs of the rows, and wrap angles, of some draws or of least squares."""
     cable, friction = fit.model.cable, fit.model.cable.friction
-    arrays = collect_row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
-    arrays |= {"group": group_numbers(friction.groups, table.group, len(table.run))}
+    groups = group_numbers(friction.groups, table.group, len(table.run))
+    of_rows = collect_row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable))
+    of_rows = replace(of_rows, group=groups)
     least, velocity = friction.conditions.least_force, table.velocity
 
     def output(values: Mapping[str, Any], which: np.ndarray, force: Any, stroke: Any) -> tuple[Any, Any]:
-        data = {name: jnp.asarray(array[which]) for name, array in arrays.items()}
-        angles, _ = resolve_angles(cable, values, data)
-        exponent = cable.friction_exponent(values, angles, data["group"], data["route"])
+        chosen = jax.tree.map(jnp.asarray, of_rows.select(which))
+        angles, _ = resolve_angles(cable, values, chosen)
+        exponent = cable.friction_exponent(values, angles, chosen.group, chosen.route)
         exponent = exponent * friction.rate(values, jnp.asarray(velocity[which]))
         cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
         read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)

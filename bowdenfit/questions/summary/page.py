@@ -12,6 +12,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.sampler_agreement import recommend_sampler
 from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.recordings.kind import list_preparations
+from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.answer import check_readings
@@ -196,12 +197,10 @@ def _input_forces(fit: Record, term: Term) -> np.ndarray:
     friction, data = fit.model.cable.friction, term.data
     if not friction.depends_on_load:
         return np.zeros(0)
-    sizes = {len(data[name]) if name in data else -1 for name in ("run", "weight", "input_force")}
-    if len(sizes) > 1 or -1 in sizes:
+    if not isinstance(data, RunsData):
         return np.full(len(term.labels), friction.conditions.reference_force)
-    weight, run = np.asarray(data["weight"]), np.asarray(data["run"])
-    total = np.bincount(run, weight, len(term.labels))
-    return np.asarray(np.exp(np.bincount(run, weight * np.log(data["input_force"]), len(term.labels)) / total))
+    weight, run, n = data.cells.weight, data.cells.run, len(term.labels)
+    return np.asarray(np.exp(np.bincount(run, weight * np.log(data.cells.input_force), n) / np.bincount(run, weight, n)))
 
 
 def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:

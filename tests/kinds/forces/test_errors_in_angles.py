@@ -122,6 +122,6 @@ def _runs(dataset: Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     model, forces = build_model(dataset), dataset.measurements.table(ForceTable)
     (term,) = model.terms
     values = model.space.constrain(jnp.zeros(model.space.size))
-    loss_sd = np.sqrt(float(values["tau"]) ** 2 + float(values["sigma_F"]) ** 2 / term.data["run_weight"])
+    loss_sd = np.sqrt(float(values["tau"]) ** 2 + float(values["sigma_F"]) ** 2 / term.data.run_weight)
     first = np.unique(forces.run, return_index=True)[1]
-    return forces.own.angle[first, 0], term.data["run_mean"], loss_sd
+    return forces.own.angle[first, 0], term.data.run_mean, loss_sd

@@ -80,7 +80,7 @@ def test_noise_neither_adds_to_the_friction_of_recordings_nor_hides_their_stroke
     named, computed = terms(sigma_block=4.0, tau=1e-9)
     apart = [np.mean(np.log(np.asarray(t.expected(named, t.data)) / t.observed())) for t in computed]
     assert abs(np.mean(apart)) < 4 * np.std(apart, ddof=1) / np.sqrt(TIMES)
-    assert np.mean([t.data["n"].sum() for t in computed]) > 0.9 * quiet.data["n"].sum()
+    assert np.mean([t.data.n.sum() for t in computed]) > 0.9 * quiet.data.n.sum()
 
 
 def test_drifts_hold_less_noise_than_the_change_from_block_to_block(bench):

@@ -56,11 +56,11 @@ def passed_on(force, noise, output, preload, exponent):
 
 def integrated(term, values) -> float:
     """Log likelihood of a term's only run with its mounting effect integrated by quadrature, the operator written out."""
-    data = {name: np.asarray(array) for name, array in term.data.items()}
-    weight, noise, preload = data["weight"][:, 0], values["sigma_block"], values["preload"]
-    force, output, noise_in = (data[k][:, 0] for k in ("likely_force", "output_force", "input_noise"))
+    data = jax.tree.map(np.asarray, term.data)
+    weight, noise, preload = data.weight[:, 0], values["sigma_block"], values["preload"]
+    force, output, noise_in = (getattr(data, k)[:, 0] for k in ("likely_force", "output_force", "input_noise"))
     gain = math.exp(values.get("gain_error", 0.0))
-    constant = (data["log_weights"][0] - data["n"][0] * np.log(2 * np.pi)) / 2 - data["n"][0] * np.log(noise)
+    constant = (data.log_weights[0] - data.n[0] * np.log(2 * np.pi)) / 2 - data.n[0] * np.log(noise)
 
     def log_joint(m):
         exponent = values["mu"] * math.pi + m
@@ -143,7 +143,7 @@ def test_expected_loss_is_the_observed_one_and_mountings_scatter_it(tmp_path):
 def test_a_likelihood_is_finite_where_the_loop_could_not_have_moved(tmp_path):
     nothing = {"tells_loss": np.array([False]), "tells_exponent": np.array([False])}
     term = term_of(folder_of(tmp_path, [recorded(amplitude=25.0, seconds=6.0)]))
-    term = replace(term, data=term.data | nothing)
+    term = replace(term, data=replace(term.data, **nothing))
     named = {name: jnp.asarray(value) for name, value in (VALUES | {"mu": 3.0, "preload": 300.0}).items()}
     value, slope = jax.jit(jax.value_and_grad(lambda v, data: term.log_likelihood(v, data).sum()))(named, term.data)
     assert np.isfinite(value)
@@ -153,7 +153,7 @@ def test_a_likelihood_is_finite_where_the_loop_could_not_have_moved(tmp_path):
 def test_long_recordings_are_joined_to_a_few_hundred_blocks(tmp_path):
     more = '[tables]\nrecordings = { prepare = { block = "none" } }'
     term = term_of(folder_of(tmp_path, [recorded(seconds=16.0, noise=0.02)], more=more))
-    assert len(term.data["weight"]) < 1000
+    assert len(term.data.weight) < 1000
     assert np.argmax([of_term(term, "log_likelihood", VALUES | {"mu": mu})[0] for mu in (0.11, 0.12, 0.13)]) == 1
 
 
@@ -161,9 +161,9 @@ def test_blocks_at_the_end_of_a_load_cell_s_range_are_no_readings(tmp_path):
     columns = {n: np.clip(v, -60, 60) if n != "time_s" else v for n, v in recorded(amplitude=60.0, seconds=8.0).items()}
     more = '[tables]\nrecordings = { prepare = { limits = { low = -60, high = 60, unit = "N" } } }'
     term = term_of(folder_of(tmp_path, [columns], more=more))
-    cut = np.abs(term.data["input_force"]) > 59.9
+    cut = np.abs(term.data.input_force) > 59.9
     assert cut.any()
-    assert not term.data["weight"][cut].any()
-    assert term.data["restart"].any()
+    assert not term.data.weight[cut].any()
+    assert term.data.restart.any()
     scores = [of_term(term, "log_likelihood", VALUES | {"mu": mu})[0] for mu in (0.11, 0.12, 0.13)]
     assert np.argmax(scores) == 1

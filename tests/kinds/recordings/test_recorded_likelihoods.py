@@ -20,7 +20,7 @@ from bowdenfit.kinds import runs as runs_of_model
 from bowdenfit.kinds.recordings.blocks import group_starts
 from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.recordings.whole_recordings import WholeRecordingsTerm, stack_rope_recordings
-from bowdenfit.kinds.row_angles import collect_row_angles
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.tables import Measurements
@@ -81,7 +81,7 @@ def _law(rows: SlidingRows, values, m):
     speed = np.nan_to_num(rows.velocity)
     rate = 1 + value["stribeck"] * np.exp(-((speed / value["stribeck_speed"]) ** 2)) + value["viscous"] * np.abs(speed)
     rate = rate / (1 + value["stribeck"])  # without measurements coefficients are stated for standstill
-    shift = rows.stroke * (value["mu"] * rows.angles["own"][:, 0] * rate + m)
+    shift = rows.stroke * (value["mu"] * rows.angles.own[:, 0] * rate + m)
     u = (rows.input_force - value["input_offset"] + drag) / REFERENCE
     u_out = (u**p - p * shift) ** (1 / p) if p else u * np.exp(-shift)
     shown = (REFERENCE * u_out - drag) * np.exp(-value["gain_error"]) + value["output_offset"]
@@ -120,11 +120,12 @@ def _rows(seed: int, n: int, values, strokes=(1, -1), angles=(2.5,), m: float = 
     force_in, velocity = generator.uniform(20.0, 90.0, n), generator.choice([5.0, 15.0, 40.0], n)
     own_angles = np.array([[angles[(i // 2) % len(angles)]] for i in range(n)])
     drift = stroke * generator.uniform(0.0, 1.5, n) if "delay_error" in values else np.zeros(n)
-    arrays = {"route": np.zeros(n), "own": own_angles, "is_own": np.ones((n, 1), dtype=bool),
-              "known_variance": np.zeros((n, 1)), "noisy": np.zeros((n, 1), dtype=bool),
-              "group": np.zeros(n, dtype=int)}  # fmt: skip
+    of_rows = RowAngles(
+        route=np.zeros(n), own=own_angles, is_own=np.ones((n, 1), dtype=bool), known_variance=np.zeros((n, 1)),
+        noisy=np.zeros((n, 1), dtype=bool), group=np.zeros(n, dtype=int),
+    )  # fmt: skip
     rows = SlidingRows(
-        force_in, force_in, np.zeros(n), stroke, np.zeros(n, dtype=int), velocity, drift, np.ones(n), arrays
+        force_in, force_in, np.zeros(n), stroke, np.zeros(n, dtype=int), velocity, drift, np.ones(n), of_rows
     )
     clean = force_in * np.exp(-stroke * _law(rows, values, m))
     ratio = stroke * np.log(force_in / clean) + values["sigma_F"] * generator.standard_normal(n) / clean
@@ -185,7 +186,7 @@ def test_a_reading_worth_three_is_three_readings():
     copied = np.repeat(np.arange(12), worth.astype(int))
     several = SlidingRows(*(getattr(rows, name)[copied] for name in
         ("input_force", "output_force", "log_ratio", "stroke", "run", "velocity", "drift", "n_effective")),
-        {name: array[copied] for name, array in rows.angles.items()})  # fmt: skip
+        rows.angles.select(copied))  # fmt: skip
     loaded_cable = _cable(sensors=GAIN)
     weighted = _of_term(_runs_term(loaded_cable, replace(rows, n_effective=worth)), "log_likelihood", values)
     np.testing.assert_allclose(
@@ -215,7 +216,7 @@ def binned_and_alone(request):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runs_of_model, "_LOAD_BINS", 10**6)
         alone = _runs_term(loaded_cable, rows)
-    assert len(binned.data["mean"]) < 1000 and len(alone.data["mean"]) == 2000
+    assert len(binned.data.cells.mean) < 1000 and len(alone.data.cells.mean) == 2000
     return _at_each(binned, points), _at_each(alone, points)
 
 
@@ -263,7 +264,7 @@ def _model(recordings, likelihood="whole", saturation="left out", **more) -> Mod
 def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
-    angles = collect_row_angles(model.description, angles_of_recordings(of_all), None).data
+    angles = collect_row_angles(model.description, angles_of_recordings(of_all), None)
     return WholeRecordingsTerm(model.cable, stack_rope_recordings(of_all, angles, censored, 1.0), of_all.runs)
 
 
@@ -288,7 +289,7 @@ def test_without_anything_that_changes_the_scale_whole_recordings_are_sums_over_
     by_sums, by_operator = np.array(results)
     apart = by_operator - by_sums
     np.testing.assert_allclose(apart[1:4], np.tile(apart[0], (3, 1)), rtol=0, atol=1e-6)
-    np.testing.assert_allclose(whole.data["n"], sums.data["n"], rtol=0.02)  # blocks before the first slide
+    np.testing.assert_allclose(whole.data.n, sums.data.n, rtol=0.02)  # blocks before the first slide
 
 
 @pytest.mark.parametrize("likelihood", ["runs", "whole"])
@@ -346,18 +347,18 @@ def test_the_mounting_effect_of_a_whole_recording_integrates_out(name):
     term = _whole(model, [recording])
     values = BLOCK | {} if name == "capstan" else BLOCK | {"drag": drag, "gain_error": gain,
         "input_offset": of_input, "output_offset": of_output}  # fmt: skip
-    data = {key: np.asarray(array)[..., 0] for key, array in term.data.items()}
-    x, passed = (np.log(data["likely_force"] + more - of_input + drag) for more in (0, data["input_noise"]))
-    start = np.log((data["output_force"][0] - of_output) * np.exp(gain) + drag)
+    data = jax.tree.map(lambda array: np.asarray(array)[..., 0], term.data)
+    x, passed = (np.log(data.likely_force + more - of_input + drag) for more in (0, data.input_noise))
+    start = np.log((data.output_force[0] - of_output) * np.exp(gain) + drag)
     noise, tau = values["sigma_block"], values["tau"]
 
     def log_joint(m):
         y = play(x, MU * 2.5 + m, float(start))[0] + passed - x
         shown = (np.exp(y) - drag) * np.exp(-gain) + of_output
-        squares = np.sum(data["weight"] * (data["reading"] - np.log(shown)) ** 2)
+        squares = np.sum(data.weight * (data.reading - np.log(shown)) ** 2)
         return float(-squares / (2 * noise**2) + stats.norm.logpdf(m, 0.0, tau))
 
-    constant = data["log_weights"] / 2 - data["n"] * np.log(noise * np.sqrt(2 * np.pi))
+    constant = data.log_weights / 2 - data.n * np.log(noise * np.sqrt(2 * np.pi))
     grid = np.linspace(-0.01, 0.05, 601)
     index = np.array([log_joint(m) for m in grid])
     log_likelihood = _of_term(term, "log_likelihood", values)[0]
@@ -375,8 +376,8 @@ def test_a_saturated_block_speaks_against_whatever_would_have_shown_less():
     model = _model([recording], saturation="censored", sensors=GAIN)
     term = model.terms[0]
     assert isinstance(term, WholeRecordingsTerm)
-    assert np.count_nonzero(term.data["censored"]) == recording.blocks.saturated.sum()
-    without = WholeRecordingsTerm(term.cable, term.data | {"censored": 0 * term.data["censored"]}, term.labels)
+    assert np.count_nonzero(term.data.censored) == recording.blocks.saturated.sum()
+    without = WholeRecordingsTerm(term.cable, replace(term.data, censored=0 * term.data.censored), term.labels)
     points = [BLOCK | {"gain_error": gain} for gain in (-0.1, 0.0, 0.1, 0.2, 0.3)]
     of_censored = _at_each(term, points) - _at_each(without, points)
     assert np.all(of_censored <= 0) and np.all(np.diff(of_censored) < 0)

@@ -33,13 +33,13 @@ def test_a_standing_phase_is_known_as_if_its_blocks_had_one_error_in_common(reco
     (term,) = model_recordings([recording], "dahl").terms
     assert isinstance(term, TurnsTerm)
     data, generator = term.data, np.random.default_rng(5)
-    deviation = generator.standard_normal(data["weight"].shape)
-    squares = float(np.sum(data["weight"] * np.asarray(_subtract_common(jnp.asarray(deviation), data)) ** 2))
-    share, start, expected = standing_share(recording.strokes.contact, recording.blocks.input_force), data["phase_start"], 0.0
+    deviation = generator.standard_normal(data.weight.shape)
+    squares = float(np.sum(data.weight * np.asarray(_subtract_common(jnp.asarray(deviation), data)) ** 2))
+    share, start, expected = standing_share(recording.strokes.contact, recording.blocks.input_force), data.phase_start, 0.0
     for first in np.unique(start):
-        rows = np.flatnonzero((start[:, 0] == first) & (data["weight"][:, 0] > 0))
+        rows = np.flatnonzero((start[:, 0] == first) & (data.weight[:, 0] > 0))
         if len(rows):
-            weight, d = data["weight"][rows, 0], deviation[rows, 0]
+            weight, d = data.weight[rows, 0], deviation[rows, 0]
             common = (1 / share[rows[0]] - 1) / weight.sum()
             expected += d @ np.linalg.solve(np.diag(1 / weight) + common, d)
     assert squares == pytest.approx(expected, rel=1e-9)

@@ -13,6 +13,7 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
+from bowdenfit.kinds.ringdown.term import RingDownTerm
 from bowdenfit.models import Model, build_model
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS
 
@@ -77,7 +78,9 @@ def posteriors(folder, cables, seed):
         lines = ["time_s,angle_rad", *(f"{t:.6f},{x:.8f}" for t, x in zip(rows, angles, strict=True))]
         (folder / "ringdown.csv").write_text("\n".join(lines) + "\n")
         model = build_model(load_dataset(folder))
-        terms = [replace(t, data=t.data | {"swings": np.zeros(SWINGS)}) if "swings" in t.data else t for t in model.terms]
+        terms = [
+            replace(t, data=replace(t.data, swings=np.zeros(SWINGS))) if isinstance(t, RingDownTerm) else t for t in model.terms
+        ]
         results.append(LogDensity(Model(model.cable, model.space, tuple(terms))))
     return truth, results
 

@@ -228,7 +228,7 @@ def test_readings_drawn_anew_are_distributed_as_the_likelihood_says():
     values = {name: v[0] for name, v in draws["values"].items()}
     assert not np.any(draws["replicated"]["efficiency"][0] == draws["replicated"]["efficiency"][1])
     runs = model.terms[2]
-    run_sd = np.sqrt(values["tau"] ** 2 + values["sigma_F"] ** 2 / runs.data["run_weight"])
+    run_sd = np.sqrt(values["tau"] ** 2 + values["sigma_F"] ** 2 / runs.data.run_weight)
     p = []
     for name, scale, sd in (
         ("wrap_angle", lambda x: x, values["sigma_theta"]),

@@ -83,9 +83,8 @@ def test_every_run_s_own_exponent_is_found_to_a_thousandth(plain, truth):
     term = next(t for t in fit.model.terms if t.name == "recorded_efficiency")
     delay = -fit.dataset.measurements.table(Recordings).items[0].account.delay
     for i, recording in enumerate(truth["recordings"]):
-        cells = term.data["run"] == i
-        weight = term.data["weight"][cells]
-        computed = np.sum(weight * (term.data["mean"] - delay * term.data["drift"])[cells]) / weight.sum()
+        cells = term.data.cells.select(term.data.cells.run == i)
+        computed = np.sum(cells.weight * (cells.mean - delay * cells.drift)) / cells.weight.sum()
         assert computed == pytest.approx(recording["exponent"] + recording["run_effect"], abs=0.001)
 
 

@@ -1,5 +1,9 @@
 """Lost forces in the likelihood: F (1 - exp(-Lambda)), read with noise."""
 
+from dataclasses import dataclass
+from typing import Any
+
+import jax
 import jax.numpy as jnp
 
 from bowdenfit.kinds.term import IndependentReadings, TermKind
@@ -8,6 +12,15 @@ from bowdenfit.parameters.space import Parameter
 from scratch.losses.kind import LossTable
 
 NOISE = "sigma_loss"
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LossData:
+    """Lost forces and input forces [N], (rows)."""
+
+    reading: Any
+    input_force: Any
 
 
 class LossTerm(IndependentReadings):
@@ -19,7 +32,7 @@ class LossTerm(IndependentReadings):
 
     def expected(self, values, data):
         exponent = self.cable.exponent_at(values, jnp.zeros(1))
-        return data["input_force"] * -jnp.expm1(-exponent)
+        return data.input_force * -jnp.expm1(-exponent)
 
 
 class LossTerms(TermKind[LossTable]):
@@ -29,7 +42,7 @@ class LossTerms(TermKind[LossTable]):
 
     def terms(self, cable, table, angles):
         labels = tuple(f"{force:g} N" for force in table.input_force)
-        return (LossTerm(cable, {"reading": table.loss, "input_force": table.input_force}, labels),)
+        return (LossTerm(cable, LossData(table.loss, table.input_force), labels),)
 
     def parameters(self, table, point):
         return [Parameter(NOISE, r"$\sigma$ loss", "noise of a lost force", "noise", HalfNormal(1.0), "N")]

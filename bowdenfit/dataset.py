@@ -2,6 +2,7 @@
 
 import glob
 import hashlib
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ from bowdenfit.kinds.descriptions import (
     parse_description,
 )
 from bowdenfit.kinds.fit_command import make_ambiguity_error, require_recordings
-from bowdenfit.kinds.lone_file import WRAP_ANGLE, understand
+from bowdenfit.kinds.lone_file import WRAP_ANGLE, refuse_several_sheets, understand
 from bowdenfit.kinds.measured_columns import refuse_far_forces
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
@@ -73,6 +74,7 @@ def load_folder_or_file(
     wrap_angle: tuple[float, str] | None,
     reading_limit: float,
     join: Path | None = None,
+    sheet: str = "",
 ) -> Dataset:
     """Read a folder with `cable.toml`, the `cable.toml` itself, or a lone table or recording.
 
@@ -85,6 +87,7 @@ def load_folder_or_file(
         wrap_angle: The angle of a lone file and its unit; None where its rows have their own.
         reading_limit: So many times the usual memory and time may be taken to read a binary file.
         join: File of a second logger with the output force.
+        sheet: Title of the sheet of a workbook that is a lone file.
 
     Raises:
         DescriptionError, DatasetError: The fault, in a sentence.
@@ -96,10 +99,15 @@ def load_folder_or_file(
             f"--join joins {join.name} to a single file, and {path} is none; in cable.toml write output_file = "
             f'"{join.name}" below the file of the [[recording]] with the input force.'
         )
+    if sheet and not is_lone_file(path):
+        raise DescriptionError(
+            f"--sheet names a sheet of a single workbook, and {path} is none; in cable.toml write sheet = {json.dumps(sheet)} "
+            "next to the file."
+        )
     with limits_times(reading_limit):
         if wrap_angle is not None or is_lone_file(path):
             return single_file_dataset(
-                path, wrap_angle, overrides, channel_sources, column_sources, missing=missing, join=join
+                path, wrap_angle, overrides, channel_sources, column_sources, missing=missing, join=join, sheet=sheet
             )
         return load_dataset(path, overrides, channel_sources, column_sources, missing)
 
@@ -148,6 +156,7 @@ def single_file_dataset(
     kind: str = "",
     missing: Sequence[str] = (),
     join: Path | None = None,
+    sheet: str = "",
 ) -> Dataset:
     """Read a data set that is one table or recording of a cable with one contact.
 
@@ -160,6 +169,7 @@ def single_file_dataset(
         kind: Name of the kind of measurement; by the file if omitted.
         missing: Missing-value codes stated there.
         join: File of a second logger with the output force, where the first has the input force alone.
+        sheet: Title of the sheet of a workbook; that with the readings if empty.
 
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
@@ -167,7 +177,9 @@ def single_file_dataset(
     if join is not None:
         require_recordings((path, join), bool(channels), tuple(columns or ()))
         kind = "recordings"
-    file = None if kind == "recordings" else understand(path, channels, columns, is_whole=False)
+    if not (sheet or channels or columns):
+        refuse_several_sheets(path)
+    file = None if kind == "recordings" else understand(path, channels, columns, is_whole=False, sheet=sheet)
     if file is not None and file.kind.other and not kind:
         raise make_ambiguity_error(file)
     kind = kind or (file.kind.kind if file else "")
@@ -184,10 +196,11 @@ def single_file_dataset(
         "name": printable(path.stem).strip()[:80] or "cable",
         "source": path.name,
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
-        "tables": {kind: {"files": glob.escape(path.name)}},
+        "tables": {kind: {"files": glob.escape(path.name)} | ({"sheet": sheet} if sheet else {})},
     }
     if join is not None:
         recording = {"file": path.name, "output_file": Path(os.path.relpath(join, path.parent)).as_posix()}
+        recording |= {"sheet": sheet} if sheet else {}
         raw |= {"tables": {kind: {}}, "recording": [recording]}
     described = add_missing_codes(add_columns(override(raw, overrides), columns or {}), missing)
     return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)

@@ -51,6 +51,7 @@ class Reading(TypedDict, total=False):
             the on-body paper has them.
         undetected: How angles too small to detect enter.
         wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
+        sheet: Title of the sheet of a workbook that is a single file.
         join: File of a second logger with the output force, where the file of the data set has the input force alone.
         reading_limit: Multiple of the usual memory and time allowed for reading a binary file of its size.
     """
@@ -68,6 +69,7 @@ class Reading(TypedDict, total=False):
         Literal["censored", "zero", "dropped"] | None, Parameter(show_default="as in cable.toml, else censored")
     ]
     wrap_angle: Annotated[Quantity | None, Parameter(metavar="ANGLE"), number_with_unit("180deg")]
+    sheet: Annotated[str | None, Parameter(metavar="TITLE", show_default="the one with the readings")]
     join: Annotated["str | Path | None", Parameter(metavar="FILE"), PATH]
     reading_limit: Annotated[int | None, Parameter(metavar="TIMES", show_default="1"), whole_number(1, 1000)]
 
@@ -116,6 +118,7 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
         as_pair(reading.get("wrap_angle")),
         reading.get("reading_limit") or 1,
         _joined_path(reading),
+        reading.get("sheet") or "",
     )
 
 

@@ -61,6 +61,10 @@ class Terminal:
         """Print what was understood without asking."""
         say(filled(sentence))
 
+    def report(self, sentence: str) -> None:
+        """Print what is left out."""
+        say(filled(sentence))
+
     def settle(self) -> None:
         """Do nothing: everything was answered."""
 
@@ -182,6 +186,9 @@ def _start_from_files(folder_: Path, files: Sequence[Path], ask: Asker) -> None:
     refuse_files(files)
     called = printable(folder_.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
     text = write_description(files, (called.strip() and called) or "cable", ask)
+    if isinstance(ask, Unattended):
+        for sentence in ask.left_out:
+            say(filled(sentence))
     _write_and_check(folder_, text, files)
 
 

@@ -27,10 +27,11 @@ class TableSettings(Frozen):
 
 
 class Table(TableSettings):
-    """One table: its file or files, and columns that do not carry the usual names."""
+    """One table: its file or files, the sheet or sheets of a workbook, and columns that do not carry the usual names."""
 
     file: str | None = None
     files: str | tuple[str, ...] | None = None
+    sheet: str | tuple[str, ...] | None = None
     columns: dict[str, ColumnSource] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -39,6 +40,8 @@ class Table(TableSettings):
             raise ValueError('the name of the file is empty; write file = "name.csv" or files = "folder/*.csv"')
         if (self.file is None) == (self.files is None):
             raise ValueError('write either file = "name.csv" or files = "folder/*.csv"')
+        if self.sheet in ("", ()):
+            raise ValueError('the title of the sheet is empty; write sheet = "Sheet1", or leave it out')
         return self
 
 
@@ -113,12 +116,14 @@ class Phase(Frozen):
 class RecordingFile(Frozen):
     """One recording: its file, what it was made at, and what its channels are called.
 
-    `where` picks the rows of a file that holds several recordings one below the other, such as { run = 3 }. The file of
-    a second logger with the output force is `output_file`; `clock_shift` is added to its times, so that both clocks agree.
+    `where` picks the rows of a file that holds several recordings one below the other, such as { run = 3 }, and `sheet` the
+    sheet of a workbook. The file of a second logger with the output force is `output_file`; `clock_shift` is added to its
+    times, so that both clocks agree.
     """
 
     file: str
     output_file: str | None = None
+    sheet: str | None = None
     clock_shift: Literal["estimated"] | QuantityValue | None = None
     name: Name | None = None
     run: Name | None = None

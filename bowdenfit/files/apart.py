@@ -73,16 +73,17 @@ class Limits:
         return cls(int(factor * (_MEMORY + _MEMORY_PER_BYTE * size)), factor * (_SECONDS + _SECONDS_PER_BYTE * size))
 
 
-def read_isolated(path: Path) -> ChannelFile:
+def read_isolated(path: Path, sheet: str = "") -> ChannelFile:
     """Read a file in the other process.
 
     Args:
         path: A file whose reader is found by its ending.
+        sheet: Title of the only sheet of a workbook that is read; all if empty.
 
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
-    result: ChannelFile = call_isolated(path, "bowdenfit.files:read_here")
+    result: ChannelFile = call_isolated(path, "bowdenfit.files:read_here", *([sheet] if sheet else []))
     return replace(result, path=path)
 
 

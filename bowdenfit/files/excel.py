@@ -1,5 +1,6 @@
 """Excel workbooks: as recordings, every sheet that holds columns of numbers; as tables, the sheet that holds readings."""
 
+import re
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -7,7 +8,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.channels import Channel, ChannelFile, load_library, refuse_damage, refuse_larger
 from bowdenfit.files.headings import Quantity, find_candidates
 from bowdenfit.files.layout import find_layout
@@ -19,11 +20,13 @@ from bowdenfit.words import listed, quoted, shown
 
 LARGEST_BYTES = 1 << 28
 _FIRST_ROWS = 300  # judged: in which headings and the first data must stand
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")
+_PERHAPS_THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
 _Cells = Sequence[Any]
 _DEFINING = (Quantity("input_force", "force"), Quantity("output_force", "force"), Quantity("efficiency", "ratio"))
 
 
-def read(path: Path) -> ChannelFile:
+def read(path: Path, sheet: str = "") -> ChannelFile:
     """Read the columns of numbers of all sheets; with several such sheets names are "Sheet/heading".
 
     A sheet that cannot be read as columns of numbers, such as one of remarks or a small evaluation, is left out with a
@@ -34,10 +37,11 @@ def read(path: Path) -> ChannelFile:
 
     Args:
         path: The workbook (.xlsx or .xlsm).
+        sheet: Title of the only sheet that is read; all if empty.
 
     Raises:
-        DatasetError: openpyxl is not installed; the file is missing, too large or damaged; no sheet holds columns of
-            numbers, or text stands among the numbers of the only one that does.
+        DatasetError: There is no such sheet; openpyxl is not installed; the file is missing, too large or damaged; no sheet
+            holds columns of numbers, or text stands among the numbers of the only one that does.
     """
     openpyxl = load_library("openpyxl", ".xlsx")
     refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
@@ -45,7 +49,7 @@ def read(path: Path) -> ChannelFile:
     remarks: list[str] = []
     errors: list[DatasetError] = []
     accounts: list[RowAccount] = []
-    for title, rows in iterate_sheets(openpyxl, path):
+    for title, rows in iterate_sheets(openpyxl, path, sheet):
         try:
             channels[title], sheet_remarks, account = _read_sheet(f"{path.name}, sheet {shown(title)}", path.name, rows)
             accounts += [account] if account else []
@@ -81,6 +85,10 @@ def _read_sheet(
 ) -> tuple[tuple[Channel, ...], list[str], RowAccount | None]:
     iterator = iter(cells)
     first = list(islice(iterator, _FIRST_ROWS))
+    remarks = list[str]()
+    if _has_decimal_commas(first):
+        first, iterator = [_read_decimal_commas(row) for row in first], map(_read_decimal_commas, iterator)
+        remarks.append("Numbers that are stored as text with a comma are read as decimals.")
     records = [CsvRecord(i, 0, [cell_text(cell) for cell in row]) for i, row in enumerate(first, start=1)]
     layout = find_layout(records, ".", place)
     if layout is None:
@@ -91,25 +99,51 @@ def _read_sheet(
     channels, left_out = make_channels(layout, columns)
     above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i + 1 not in layout.over}
     account = make_account(file, start + columns.rows, layout.over, above | columns.left_out, columns.beside)
-    return channels, [*left_out, *columns.remarks], account
+    return channels, [*remarks, *left_out, *columns.remarks], account
 
 
-def read_workbook(path: Path, most: int | None = None) -> RawTable:
+def _has_decimal_commas(rows: Iterable[_Cells]) -> bool:
+    """Return whether text cells of a sheet are numbers with a decimal comma, of which one at least cannot be thousands."""
+    texts = [cell for row in rows for cell in row if isinstance(cell, str)]
+    return any(_DECIMAL_COMMA.fullmatch(text) and not _PERHAPS_THOUSANDS.fullmatch(text) for text in texts)
+
+
+def _read_decimal_commas(row: _Cells) -> _Cells:
+    """Return the cells of a row, as numbers where they are text with a decimal comma."""
+    matches = [_DECIMAL_COMMA.fullmatch(cell) if isinstance(cell, str) else None for cell in row]
+    return [float(match[0].replace(",", ".")) if match else cell for cell, match in zip(row, matches, strict=True)]
+
+
+def list_sheets(path: Path) -> tuple[str, ...]:
+    """Return the titles of the sheets of a workbook on which something stands.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    openpyxl = load_library("openpyxl", ".xlsx")
+    refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
+    sheets = iterate_sheets(openpyxl, path)
+    return tuple(title for title, rows in sheets if any(cell_text(cell).strip() for row in rows for cell in row))
+
+
+def read_workbook(path: Path, most: int | None = None, sheet: str = "") -> RawTable:
     """Return the table of a workbook; of several sheets that hold one, that whose headings say what they are.
 
     Args:
         path: The workbook (.xlsx or .xlsm).
         most: Number of first rows of each sheet that are enough; all if omitted.
+        sheet: Title of the sheet that is read; that with the table if empty.
 
     Raises:
-        DatasetError: It cannot be read, or holds no table, or several that could be meant.
+        DatasetError: It cannot be read, has no such sheet, or holds no table, or several that could be meant.
     """
     openpyxl = load_library("openpyxl", ".xlsx")
     refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
     tables: dict[str, RawTable] = {}
     filled = list[str]()
     errors: list[DatasetError] = []
-    for title, rows in iterate_sheets(openpyxl, path):
+    place = f"{path.name}, sheet {shown(sheet)}" if sheet else path.name
+    for title, rows in iterate_sheets(openpyxl, path, sheet):
         cells = [[cell_text(cell).strip() for cell in row] for row in islice(rows, most)]
         while cells and not any(cells[-1]):
             cells.pop()  # Excel keeps the format of rows that were once filled
@@ -118,21 +152,26 @@ def read_workbook(path: Path, most: int | None = None) -> RawTable:
         try:
             if not all(record.blank for record in records):
                 filled.append(title)
-                tables[title] = make_table(path.name, lines, records, ";")
+                tables[title] = make_table(place, lines, records, ";")
         except DatasetError as error:
             errors.append(error)
+    if sheet and not filled:
+        raise DatasetError(f"{place}: nothing is on this sheet; name another one.")
     by_headings = {title: table for title, table in tables.items() if _has_forces(table)} or tables
     if len(by_headings) == 1:
-        ((sheet, table),) = by_headings.items()
-        unread = [shown(title) for title in filled if title != sheet]
-        note = f"of its sheets only {shown(sheet)} is read, and {listed(unread)} {'is' if len(unread) == 1 else 'are'} not"
+        ((title, table),) = by_headings.items()
+        unread = [shown(other) for other in filled if other != title]
+        note = f"of its sheets only {shown(title)} is read, and {listed(unread)} {'is' if len(unread) == 1 else 'are'} not"
         return replace(table, lines=replace(table.lines, note=note)) if unread else table
     if not tables and errors:
         raise errors[0]
     what = (
         f"several sheets that could be meant, {quoted(tuple(by_headings))}" if by_headings else "no sheet with a table"
     )
-    raise DatasetError(f"{path.name} has {what}; save the one with the readings as CSV, or in a workbook of its own.")
+    remedy = f"state the one with the readings, such as --sheet {quoted(tuple(by_headings)[:1])}" if by_headings else (
+        "write the headings, with units, above the columns of the readings"
+    )
+    raise DatasetError(f"{path.name} has {what}; {remedy}.")
 
 
 def _has_forces(table: RawTable) -> bool:
@@ -141,14 +180,23 @@ def _has_forces(table: RawTable) -> bool:
     return bool(columns["efficiency"] or (columns["input_force"] and columns["output_force"]))
 
 
-def iterate_sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
-    """Yield the title and rows of each sheet; what the library cannot read becomes one sentence."""
+def iterate_sheets(openpyxl: Any, path: Path, only: str = "") -> Iterator[tuple[str, Iterator[_Cells]]]:
+    """Yield the title and rows of each sheet, or of the only one; what the library cannot read becomes one sentence.
+
+    Raises:
+        DatasetError: There is no such sheet.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # on styles and validations, which do not matter here
         with refuse_damage(path):
             workbook = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
+            titles = [sheet.title for sheet in workbook.worksheets]
+            if only and only not in titles:
+                raise DatasetError(f"{path.name} has no sheet {shown(only)}{suggest_name(only, titles)}")
             for sheet in workbook.worksheets:
+                if only and sheet.title != only:
+                    continue
                 sheet.reset_dimensions()
                 yield sheet.title, _rows(path, sheet)
         finally:

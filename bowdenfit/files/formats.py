@@ -14,13 +14,15 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.apart import read_isolated
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.text_file import first_bytes
+from bowdenfit.words import shown
 
 _ROOM = "bowdenfit.files"
+WORKBOOKS = (".xlsx", ".xlsm")
 TEXT = tuple(f".{ending}" for ending in ("csv", "txt", "tsv", "dat", "asc", "log", "lvm"))
 
 FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
     **dict.fromkeys(TEXT, f"{_ROOM}.csv_recording"),
-    **dict.fromkeys((".xlsx", ".xlsm"), f"{_ROOM}.excel"),
+    **dict.fromkeys(WORKBOOKS, f"{_ROOM}.excel"),
     **dict.fromkeys((".parquet", ".pq"), f"{_ROOM}.parquet"),
     ".mat": f"{_ROOM}.matlab",
     **dict.fromkeys((".h5", ".hdf5"), f"{_ROOM}.hdf5"),
@@ -31,7 +33,7 @@ FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
 }
 """Who reads files with an ending: a function, or a module whose `read` is imported with the first such file."""
 
-_KEPT: WeakValueDictionary[tuple[Path, int, int, int], ChannelFile] = WeakValueDictionary()
+_KEPT: WeakValueDictionary[tuple[Path, int, int, int, str], ChannelFile] = WeakValueDictionary()
 
 
 @dataclass(frozen=True)
@@ -89,16 +91,16 @@ _STARTS = {  # the longer start before the shorter one
     b"version https://git-lfs": Content("a Git LFS pointer without the data", (), "run 'git lfs pull' first"),
 }
 PLAIN_TEXT = Content("text", TEXT)
-_ZIP = Content("a ZIP archive", (".xlsx", ".xlsm"), _UNPACK)  # what is left of a workbook, perhaps
+_ZIP = Content("a ZIP archive", WORKBOOKS, _UNPACK)  # what is left of a workbook, perhaps
 _NO_WORKBOOK = Content("a ZIP archive", (), _UNPACK)
-_WORKBOOK = Content("an Excel workbook", (".xlsx", ".xlsm"))
+_WORKBOOK = Content("an Excel workbook", WORKBOOKS)
 _OPEN_DOCUMENT = Content("an OpenDocument spreadsheet", (), "open it in LibreOffice and save it as .xlsx")
 _PAGE = Content("a web page", (), "download the recording itself, or export it as CSV")
 _XML = Content("an XML file, such as those of Logger Pro (.cmbl)", (".cmbl",), _EXPORT)
 _CONTENTS = (UNKNOWN, *_STARTS.values(), _ZIP, _XML)
 
 
-def read_channels(path: Path) -> ChannelFile:
+def read_channels(path: Path, sheet: str = "") -> ChannelFile:
     """Read all numeric channels of a recording, whatever program wrote it.
 
     The ending chooses the reader; the first bytes are looked at first, so that a file with the wrong ending is refused
@@ -107,33 +109,47 @@ def read_channels(path: Path) -> ChannelFile:
 
     Args:
         path: A file, or the folder of a ROS 2 bag.
+        sheet: Title of the only sheet of a workbook that is read; all if empty.
 
     Raises:
         DatasetError: The file is missing, empty, unreadable, damaged, too large, not what its ending says, or of no
             kind that can be read; or its library is not installed.
     """
     status = path.stat() if path.is_file() else None
-    key = (path.resolve(), status.st_mtime_ns, status.st_size, status.st_ino) if status else None
+    key = (path.resolve(), status.st_mtime_ns, status.st_size, status.st_ino, sheet) if status else None
     result = _KEPT.get(key) if key else None
     if result is None:
-        result = _read_uncached(path)
+        result = _read_uncached(path, sheet)
         if key:
             _KEPT[key] = result
     return replace(result, path=path) if result.path != path else result
 
 
-def _read_uncached(path: Path) -> ChannelFile:
+def refuse_sheet(path: Path, sheet: str) -> None:
+    """Refuse the title of a sheet for a file that has none.
+
+    Raises:
+        DatasetError: There is a title.
+    """
+    if sheet:
+        raise DatasetError(f"{path.name} is not a workbook and has no sheet {shown(sheet)}; leave the sheet out.")
+
+
+def _read_uncached(path: Path, sheet: str) -> ChannelFile:
     """Return the channels of a file that is not in memory."""
     ending = ".bag" if is_ros2_folder(path) else check_ending(path)
     if str(FORMATS[ending]).startswith(f"{_ROOM}.") and ending not in TEXT:
-        return read_isolated(path)
-    return read_here(path)
+        return read_isolated(path, sheet)
+    return read_here(path, sheet)
 
 
-def read_here(path: Path) -> ChannelFile:
+def read_here(path: Path, sheet: str = "") -> ChannelFile:
     """Return all numeric channels of a recording, read in this process; see `read_channels`."""
-    reader = FORMATS[".bag" if is_ros2_folder(path) else check_ending(path)]
-    result: ChannelFile = import_module(reader).read(path) if isinstance(reader, str) else reader(path)
+    ending = ".bag" if is_ros2_folder(path) else check_ending(path)
+    reader, sheets = FORMATS[ending], (sheet,) if sheet else ()
+    if ending not in WORKBOOKS:
+        refuse_sheet(path, sheet)
+    result: ChannelFile = import_module(reader).read(path, *sheets) if isinstance(reader, str) else reader(path, *sheets)
     return result
 
 

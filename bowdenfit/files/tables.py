@@ -7,7 +7,7 @@ from pathlib import Path
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
-from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
+from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, WORKBOOKS, check_ending, recognize, refuse_sheet
 from bowdenfit.files.headings import heading_of, repeated_heading
 from bowdenfit.files.measured_cells import is_measured, split_measured
 from bowdenfit.files.pivot import unpivot
@@ -28,7 +28,6 @@ from bowdenfit.files.unit_columns import in_one_unit, join_unit_columns
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
-WORKBOOKS = (".xlsx", ".xlsm")
 _FIRST_BYTES = 1 << 18  # judged: bytes that hold the first rows
 _MOST_COLUMNS = 2000  # judged: tables of forces have some ten; each is compared with every spelling of a heading
 _MOST_CELLS = 150_000  # measured: each takes some 60 us; ring-downs of 50 s at 1 kHz have as many
@@ -73,22 +72,38 @@ class RawTable:
         return self.lines
 
 
-def read_table(path: Path, most: int | None = None) -> RawTable:
+def read_table(path: Path, most: int | None = None, sheet: str = "") -> RawTable:
     """Read one table from a CSV file or an Excel workbook.
 
     Args:
         path: The file.
         most: Number of its first rows that are enough; all if omitted.
+        sheet: Title of the sheet of a workbook that is read; that with the table if empty.
 
     Raises:
         DatasetError: See `read_csv` and `read_workbook`.
     """
     refuse_special(path)
     if path.suffix.lower() not in WORKBOOKS:
+        refuse_sheet(path, sheet)
         return read_csv(path, most)
     check_ending(path)
-    table: RawTable = call_isolated(path, "bowdenfit.files.excel:read_workbook", most)
+    table: RawTable = call_isolated(path, "bowdenfit.files.excel:read_workbook", most, sheet)
     return table
+
+
+def list_sheets(path: Path) -> tuple[str, ...]:
+    """Return the titles of the sheets of a workbook on which something stands; none for another file.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    refuse_special(path)
+    if path.suffix.lower() not in WORKBOOKS:
+        return ()
+    check_ending(path)
+    titles: tuple[str, ...] = call_isolated(path, "bowdenfit.files.excel:list_sheets")
+    return titles
 
 
 def read_csv(path: Path, most: int | None = None) -> RawTable:

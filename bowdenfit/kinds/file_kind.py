@@ -11,11 +11,11 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import is_date, names_time, stated_rate
-from bowdenfit.files.formats import TEXT
+from bowdenfit.files.formats import TEXT, WORKBOOKS
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of
 from bowdenfit.files.serial_log import is_serial_log
 from bowdenfit.files.spellings import parse_heading, without_accents
-from bowdenfit.files.tables import WORKBOOKS, RawTable, read_table
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
 from bowdenfit.kinds.forces.stated_noise import FORCE_SDS
 from bowdenfit.kinds.forces.table import count_loads
@@ -106,7 +106,9 @@ class FileKind:
     other: str = ""
 
 
-def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ()) -> FileKind:
+def guess_file_kind(
+    path: Path, has_channels: bool = False, named: Sequence[str] = (), sheet: str = ""
+) -> FileKind:
     """Guess the kind of measurement that a file without a description holds.
 
     A time column makes a recording, unless a column of runs, strokes or groups says that its rows are readings of their own;
@@ -116,6 +118,7 @@ def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str]
         path: The file.
         has_channels: Whether the user names channels, as recordings have.
         named: Quantities whose columns the user names, as tables have.
+        sheet: Title of the sheet of a workbook; that with a table if empty.
 
     Raises:
         DatasetError: The file is missing or empty, or no text although its ending says so.
@@ -133,7 +136,7 @@ def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str]
     if path.suffix.lower() in TEXT and is_serial_log(path):
         return FileKind("recordings", "its lines have numbers behind the same keys, as logs of a serial line do")
     try:
-        table = read_table(path, HEAD)
+        table = read_table(path, HEAD, sheet)
     except DatasetError as error:
         return _guess_without_headings(path, error)
     return _guess_by_columns(path, table)

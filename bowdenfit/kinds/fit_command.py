@@ -76,6 +76,11 @@ def _naming(quantity: str, heading: str, unit: str = "") -> str:
 
 def make_commands(file: LoneFile) -> list[FitCommand]:
     """Make the command that fits a file; both where it could be a table or a recording, in this order."""
+    return [command.with_options("--sheet", [file.sheet] if file.sheet else []) for command in _make_commands(file)]
+
+
+def _make_commands(file: LoneFile) -> list[FitCommand]:
+    """Make the commands for a file, without its sheet."""
     if not file.kind.other:
         return [_make_recording_command(file) if file.recording else _make_table_command(file, file.kind.kind)]
     kind = file.kind.kind if file.kind.other == "recordings" else file.kind.other

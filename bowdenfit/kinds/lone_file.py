@@ -21,17 +21,17 @@ from bowdenfit.files.headings import Quantity, find_candidates, heading_of, opti
 from bowdenfit.files.layout import is_index
 from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, names_length, parse_heading
-from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.files.tables import RawTable, list_sheets, read_table
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.file_kind import HEAD, FileKind, guess_file_kind, read_numbers
+from bowdenfit.kinds.file_kind import FORCES, HEAD, FileKind, guess_file_kind, is_angle_table, read_numbers
 from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels
 from bowdenfit.recordings.forces import clock_in_doubt
 from bowdenfit.recordings.named_channels import WANTED, find_channel
 from bowdenfit.types import Vector
 from bowdenfit.units import ColumnSource, dimension_of, is_unit
-from bowdenfit.words import shown
+from bowdenfit.words import quoted, shown
 
-WRAP_ANGLE = Quantity("wrap_angle", "angle")
+WRAP_ANGLE, _EFFICIENCY = Quantity("wrap_angle", "angle"), Quantity("efficiency", "ratio")
 _FEW = 20  # rows up to which 1, 2, 3 may be loads as well as an index; a judgement
 
 
@@ -134,6 +134,7 @@ class LoneFile:
         table: Its rows; None for a recording.
         recording: Its channels; None for a table.
         angle: The channel that says at which wrap angle it was recorded; None without one.
+        sheet: Title of its sheet where it is one of a workbook; empty where nobody chose one.
     """
 
     path: Path
@@ -143,6 +144,12 @@ class LoneFile:
     table: RawTable | None = None
     recording: ChannelFile | None = None
     angle: AngleChannel | None = None
+    sheet: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name, with that of its sheet."""
+        return f"{self.path.name}, sheet {shown(self.sheet)}" if self.sheet else self.path.name
 
     @property
     def signals(self) -> tuple[FileColumn, ...]:
@@ -192,6 +199,17 @@ class LoneFile:
                 unwritten = likely_angle_unit(column.name, column.high, column.are_whole) or None
                 likely[column.name] = "" if spelling.unit else unwritten
         return likely
+
+    @property
+    def is_angles(self) -> bool:
+        """Whether it holds nothing but wrap angles by length."""
+        return self.table is not None and is_angle_table(self.table)
+
+    @property
+    def is_bench(self) -> bool:
+        """Whether it can be fitted alone by its headings: a recording, both forces of a cable, or its efficiency."""
+        columns = find_candidates(self.headings, (*FORCES, _EFFICIENCY))
+        return bool(self.recording or columns["efficiency"] or (columns["input_force"] and columns["output_force"]))
 
     @property
     def lengths(self) -> int:
@@ -258,6 +276,7 @@ def understand(
     columns: Mapping[str, ColumnSource] | None = None,
     missing: Sequence[float | str] = (),
     is_whole: bool = True,
+    sheet: str = "",
 ) -> LoneFile:
     """Return what is understood of a file without a description.
 
@@ -267,34 +286,77 @@ def understand(
         columns: Columns of a table, likewise.
         missing: Missing-value codes.
         is_whole: Whether all of it is read; else the first rows of a table, and of a recording its kind alone.
+        sheet: Title of a sheet of a workbook; that with the readings if empty.
 
     Raises:
         DatasetError: It cannot be read.
     """
-    kind = guess_file_kind(path, bool(channels), tuple(columns or ()))
+    kind = guess_file_kind(path, bool(channels), tuple(columns or ()), sheet)
     if KINDS[kind.kind].takes_channels and not kind.other:
         if is_whole:
-            return understand_recording(path, kind.why, channels, missing)
-        return LoneFile(path, kind, named=channels or {})
-    table = MissingCodes(tuple(missing)).mark(read_table(path, None if is_whole else HEAD))
-    return LoneFile(path, kind, _columns_of_table(table), columns or {}, table)
+            return understand_recording(path, kind.why, channels, missing, sheet)
+        return LoneFile(path, kind, named=channels or {}, sheet=sheet)
+    table = MissingCodes(tuple(missing)).mark(read_table(path, None if is_whole else HEAD, sheet))
+    return LoneFile(path, kind, _columns_of_table(table), columns or {}, table, sheet=sheet)
+
+
+def understand_sheets(path: Path) -> tuple[dict[str, LoneFile], dict[str, str]]:
+    """Return what is understood of every sheet of a workbook, and why the others cannot be used, by their titles.
+
+    Of another file, or of a workbook with one sheet, both are empty.
+
+    Raises:
+        DatasetError: It is no workbook that can be read.
+    """
+    files, reasons = dict[str, LoneFile](), dict[str, str]()
+    titles = list_sheets(path)
+    for title in titles if len(titles) > 1 else ():
+        try:
+            file = understand(path, sheet=title)
+        except DatasetError as error:
+            reasons[title] = str(error)
+            continue
+        if file.numbers:
+            files[title] = file
+        else:
+            reasons[title] = "It has no columns of numbers."
+    return files, reasons
+
+
+def refuse_several_sheets(path: Path) -> None:
+    """Refuse a workbook of which several sheets can be fitted, each by itself.
+
+    Raises:
+        DatasetError: It is one, or cannot be read.
+    """
+    benches = [title for title, file in understand_sheets(path)[0].items() if file.is_bench]
+    if len(benches) > 1:
+        raise DatasetError(
+            f"{path.name} has several sheets that can be fitted, {quoted(tuple(benches))}; state which, such as --sheet "
+            f"{shown(benches[0])}, or fit them together: bowdenfit init my-cable --from {path.name}."
+        )
 
 
 def understand_recording(
-    path: Path, why: str, channels: Mapping[str, ColumnSource] | None = None, missing: Sequence[float | str] = ()
+    path: Path,
+    why: str,
+    channels: Mapping[str, ColumnSource] | None = None,
+    missing: Sequence[float | str] = (),
+    sheet: str = "",
 ) -> LoneFile:
     """Return what is understood of a file that is a recording, for the reason given as a clause.
 
     Raises:
         DatasetError: It cannot be read.
     """
-    file, notes = MissingCodes(tuple(missing)).blank_samples(read_channels(path))
+    file, notes = MissingCodes(tuple(missing)).blank_samples(read_channels(path, sheet))
     file, angle, sources = replace(file, remarks=(*file.remarks, *notes)), None, channels or {}
     with suppress(DatasetError):
         force = find_channel(file, WANTED[0], sources)
         angle = next(iter(find_angle_channels(file, sources, np.zeros(0) if force is None else force.values)), None)
     kind = next(kind.name for kind in KINDS.values() if kind.takes_channels)
-    return LoneFile(path, FileKind(kind, why), tuple(map(_column_of_channel, file.channels)), sources, None, file, angle)
+    columns = tuple(map(_column_of_channel, file.channels))
+    return LoneFile(path, FileKind(kind, why), columns, sources, None, file, angle, sheet)
 
 
 def _columns_of_table(table: RawTable) -> tuple[FileColumn, ...]:

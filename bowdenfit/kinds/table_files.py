@@ -77,12 +77,18 @@ class Source:
         return paths[0]
 
     @property
+    def sheets(self) -> tuple[str, ...]:
+        """Titles of the sheets that are read of each workbook; one that is empty where none is stated."""
+        stated = self.settings.sheet
+        return (stated,) if isinstance(stated, str) else stated or ("",)
+
+    @property
     def columns(self) -> dict[str, ColumnSource]:
         """Columns that do not have the usual names."""
         return self.settings.columns
 
     def read_table(
-        self, path: Path, wanted: tuple[Quantity, ...], unused: tuple[str, ...] = ()
+        self, path: Path, wanted: tuple[Quantity, ...], unused: tuple[str, ...] = (), sheet: str | None = None
     ) -> tuple[RawTable, dict[str, Column]]:
         """Return one of the tables and the wanted quantities that it has, without rows that a stated code marks as missing.
 
@@ -90,12 +96,17 @@ class Source:
             path: The file.
             wanted: Quantities to look for.
             unused: Names that the user may give a column although nothing reads it.
+            sheet: Title of the sheet of a workbook; the stated one if omitted.
 
         Raises:
-            DatasetError: See `read_table`; or every row holds a code.
+            DatasetError: See `read_table`; or every row holds a code, or several sheets are stated.
         """
+        if sheet is None:
+            sheet, *more = self.sheets
+            if more:
+                raise DatasetError(f"the table {self.kind} must be on one sheet; cable.toml names {len(self.sheets)}.")
         codes = MissingCodes(self.settings.missing)
-        table = codes.mark(read_table(path))
+        table = codes.mark(read_table(path, sheet=sheet))
         table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)
         return leave_out_coded_rows(table, columns, wanted, codes)
 

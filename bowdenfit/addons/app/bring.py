@@ -208,7 +208,7 @@ def _show_file(draft: Draft, file: MeasuredFile, look_again: Again) -> None:
     with block("section"):
         with block("div", "row"):
             text(file.name, "h3", dir="auto")
-            _remove_button(draft, file.name, look_again)
+            _remove_button(draft, file.path.name, look_again)
         if file.holds:
             text(f"It holds {file.holds}.")
         with block("div", "wide", role="region", tabindex="0", aria_label=f"Columns of {file.name}"), block("table", "columns"):

@@ -72,6 +72,10 @@ class Form:
         """Keep what was understood without asking."""
         self.sentences.append(sentence)
 
+    def report(self, sentence: str) -> None:
+        """Keep what is left out."""
+        self.sentences.append(sentence)
+
     def settle(self) -> None:
         """Do nothing: everything was answered."""
 

@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 from bowdenfit.addons.app.draft import Refusal, list_refusals
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, DatasetError, Faults, UsageError
-from bowdenfit.files.tables import WORKBOOKS, RawTable, read_table
+from bowdenfit.files.formats import WORKBOOKS
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.files.text_file import SEPARATORS, Line, declared_separator, first_lines, split_cells
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS

@@ -116,14 +116,16 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         DatasetError: See `read_table` and `find_columns`; or a force is not positive, or a stroke is unknown.
     """
     paths, contacts = source.files, source.description.angle_columns
-    faults = Faults()
-    parts = [part for part in faults.read_all(lambda path: _read_force_file(path, source), paths, None) if part is not None]
+    faults, sheets = Faults(), [(path, sheet) for path in paths for sheet in source.sheets]
+    read = faults.read_all(lambda sheet: _read_force_file(*sheet, source), sheets, None)
+    parts = [part for part in read if part is not None]
     faults.refuse()
     names: list[str] = []
     runs = []
-    for path, (part, *_) in zip(paths, parts, strict=True):
+    for (path, sheet), (part, *_) in zip(sheets, parts, strict=True):
         runs.append(part.run + len(names))
-        names += [f"{path.stem}:{name}" if len(paths) > 1 else name for name in part.run_names]
+        label = sheet if len(paths) == 1 else f"{path.stem}:{sheet}" if sheet else path.stem
+        names += [f"{label}:{name}" if len(sheets) > 1 else name for name in part.run_names]
     tables = [part for part, *_ in parts]
     own_angles = OwnAngles(
         tuple(contacts),
@@ -212,7 +214,7 @@ def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
     return next(iter(units), "")
 
 
-def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
+def _read_force_file(path: Path, sheet: str, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     route, contacts = source.description.route, source.description.angle_columns
     optional_columns = (
         Quantity("run", "text"),
@@ -221,7 +223,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
         GROUP,
     )
     table, columns = source.read_table(
-        path, (*ENDS, *FORCE_SDS, *optional_columns, *shared_columns(source.description)), _UNUSED
+        path, (*ENDS, *FORCE_SDS, *optional_columns, *shared_columns(source.description)), _UNUSED, sheet
     )
     nothing = np.full(len(table.rows), np.nan)
     read = partial(_read_tensions, table, columns, source.description)

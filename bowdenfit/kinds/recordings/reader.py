@@ -37,6 +37,7 @@ class RecordingsTable(TableSettings):
     """
 
     files: str | tuple[str, ...] | None = None
+    sheet: str | None = None
     pattern: str | None = None
     channels: dict[str, ChannelSource] = Field(default_factory=dict)
     likelihood: Literal["runs", "whole"] = "runs"
@@ -178,7 +179,8 @@ def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     for path in source.files:
         refuse_special(path)
         if path.resolve() not in named:
-            entries.append((path, parse_file_name(description, source.settings.pattern, path, source.name_of(path))))
+            entry = parse_file_name(description, source.settings.pattern, path, source.name_of(path))
+            entries.append((path, entry.model_copy(update={"sheet": source.settings.sheet})))
     labels, files = [entry.run or "" for _, entry in entries], [path.name for path, _ in entries]
     runs_of_files = zip(entries, unify_labels(labels, files, "runs of recordings"), strict=True)
     entries = [(path, entry.model_copy(update={"run": run or None})) for (path, entry), run in runs_of_files]
@@ -203,7 +205,7 @@ def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:
 
 
 def _recording_name(path: Path, entry: RecordingFile) -> str:
-    return entry.name or entry.run or path.stem
+    return entry.name or entry.run or (f"{path.stem}, {entry.sheet}" if entry.sheet else path.stem)
 
 
 def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
@@ -217,7 +219,8 @@ def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
         | dict(source.channels)
     )
     paths = [path, *([source.folder / entry.output_file] if entry.output_file else [])]
-    blanked = [MissingCodes(table.missing).blank_samples(read_channels(file)) for file in paths]
+    titles = [entry.sheet or "", ""]
+    blanked = [MissingCodes(table.missing).blank_samples(read_channels(*pair)) for pair in zip(paths, titles, strict=False)]
     files, remarks = [file for file, _ in blanked], tuple(remark for _, words in blanked for remark in words)
     rows, *output_rows = (rows_where(file, entry.where) for file in files)
     raw, unit = to_recording(

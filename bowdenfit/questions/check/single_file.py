@@ -1,7 +1,7 @@
 """What `bowdenfit check FILE` says of a file alone: what it is, its columns or channels, and the command that fits it."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import cast
@@ -14,13 +14,12 @@ from bowdenfit.files import read_channels
 from bowdenfit.files.apart import limits_times
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock
-from bowdenfit.files.formats import TEXT
+from bowdenfit.files.formats import TEXT, WORKBOOKS
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
-from bowdenfit.files.tables import WORKBOOKS
 from bowdenfit.kinds import KINDS, iterate_tables
-from bowdenfit.kinds.file_kind import columns_of_kind, is_angle_table
+from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, make_commands
-from bowdenfit.kinds.lone_file import LoneFile, understand
+from bowdenfit.kinds.lone_file import LoneFile, understand, understand_sheets
 from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.questions.check.data_set_words import (
     check_data_set,
@@ -32,7 +31,7 @@ from bowdenfit.reading import Reading
 from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
+from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table, shown
 
 _CHOICES = ("noise", "friction", "geometry", "undetected")  # options that the command repeats
 ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
@@ -61,17 +60,60 @@ def describe_single_file(path: Path, reading: Reading) -> tuple[str, bool]:
         BowdenfitError: The file cannot be read, or not with these keywords.
     """
     with limits_times(reading.get("reading_limit") or 1):
-        channels, columns = parse_channels(reading.get("channels", ())), parse_sources(reading.get("columns", ()), "--column")
-        file = understand(path, channels, columns, reading.get("missing", ()))
-        if file.recording is not None:
-            return _describe_recording(file, file.recording, reading)
-        assert file.table is not None
-        if file.kind.other:
-            backwards = _backward_clock(path)
-            return _describe_table(file, make_commands(file), None, backwards, not backwards), False  # `fit` asks which it is
-        if is_angle_table(file.table) and not columns:
-            return _describe_angle_table(file), True
-        return _describe_readings(file, reading)
+        sheets, reasons = ({}, {}) if reading.get("sheet") else understand_sheets(path)
+        return _describe_workbook(path, sheets, reasons, reading) if sheets or reasons else _describe_sheet(path, reading)
+
+
+def _describe_workbook(
+    path: Path, sheets: Mapping[str, LoneFile], reasons: Mapping[str, str], reading: Reading
+) -> tuple[str, bool]:
+    """Describe the sheets of a workbook, and the one that can be fitted, or the command for all of them.
+
+    Args:
+        path: The workbook.
+        sheets: The sheets that hold numbers, by title.
+        reasons: Why each other sheet cannot be used.
+        reading: Keywords of `bowdenfit.read`.
+    """
+    benches = {title: file for title, file in sheets.items() if file.is_bench}
+    rows = [(shown(title), _describe_content(file), "yes" if file.is_bench else "no") for title, file in sheets.items()]
+    rows += [(shown(title), "no readings", "no") for title in reasons]
+    heads = ["sheet", "holds", "can be fitted alone"]
+    lines = [f"{path.name}: a workbook of {counted(len(rows), 'sheet')}.", "", narrow_table(heads, rows, left=heads)]
+    lines += ["", *(filled(f"Sheet {shown(title)}: {reason}") for title, reason in reasons.items())] if reasons else []
+    if len(benches) > 1 or any(file.is_angles for file in sheets.values()):
+        lines += ["", "To fit its sheets together:", _describe_init([path])]
+    if len(benches) > 1:
+        lines += ["", "To fit one of them:", *(wrap_command(make_commands(file)[0]) for file in benches.values())]
+        return "\n".join(lines) + "\n", False
+    chosen = cast(Reading, {**reading, "sheet": next(iter(benches))}) if benches else reading
+    text, is_usable = _describe_sheet(path, chosen)
+    return "\n".join([*lines, "", text]), is_usable
+
+
+def _describe_content(file: LoneFile) -> str:
+    """Return the contents of a sheet in a few words."""
+    if file.recording is not None:
+        return f"a recording of {counted(max(len(column.values) for column in file.columns), 'sample')}"
+    rows = len(file.table.rows) if file.table else 0
+    if file.is_angles:
+        return f"wrap angles at {counted(rows, 'length')}"
+    return counted(rows, "reading" if file.is_bench else "row")
+
+
+def _describe_sheet(path: Path, reading: Reading) -> tuple[str, bool]:
+    """Describe a file, or one sheet of a workbook; see `describe_single_file`."""
+    channels, columns = parse_channels(reading.get("channels", ())), parse_sources(reading.get("columns", ()), "--column")
+    file = understand(path, channels, columns, reading.get("missing", ()), sheet=reading.get("sheet") or "")
+    if file.recording is not None:
+        return _describe_recording(file, file.recording, reading)
+    assert file.table is not None
+    if file.kind.other:
+        backwards = _backward_clock(path)
+        return _describe_table(file, make_commands(file), None, backwards, not backwards), False  # `fit` asks which it is
+    if file.is_angles and not columns:
+        return _describe_angle_table(file), True
+    return _describe_readings(file, reading)
 
 
 def _describe_readings(file: LoneFile, reading: Reading) -> tuple[str, bool]:
@@ -103,7 +145,7 @@ def _find_neighbors(path: Path, angles: bool) -> list[Path]:
         if other != path and other.is_file() and other.suffix.lower() in (*TEXT, *WORKBOOKS):
             with suppress(BowdenfitError):
                 file = understand(other, is_whole=False)
-                fits = file.table is not None and is_angle_table(file.table) if angles else bool(file.lengths)
+                fits = file.is_angles if angles else bool(file.lengths)
                 neighbors += [other] if fits else []
     return neighbors
 
@@ -131,7 +173,7 @@ def _describe_angle_table(file: LoneFile) -> str:
         "It is fitted together with readings of forces or efficiencies, or recordings, at some of these lengths: name it in "
         f'cable.toml, [tables] angles = {{ file = "{file.path.name}" }}; bowdenfit init writes that file.'
     )
-    title = f"{file.path.name}: a table of wrap angles at {counted(len(file.table.rows), 'length')}."
+    title = f"{file.name}: a table of wrap angles at {counted(len(file.table.rows), 'length')}."
     lines = [title, "", _column_table(file, ()), "", *describe_row_account(file.table.lines), "", filled(place)]
     if readings := _find_neighbors(file.path, angles=False):
         lines += ["", "To write it for these files:", _describe_init([file.path, *readings])]
@@ -159,7 +201,9 @@ def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading
     wrap_angle = ANY_ANGLE if file.angle is None else (file.angle.angle, "rad")
     recordings, obstacle, notes = None, "", list[str]()
     try:
-        data = single_file_dataset(file.path, wrap_angle, (), file.named, kind="recordings", missing=missing)
+        data = single_file_dataset(
+            file.path, wrap_angle, (), file.named, kind="recordings", missing=missing, sheet=file.sheet
+        )
         recordings = data.measurements.table(Recordings)
         of_rows = [remark for account in data.accounts for remark in account.remarks]
         notes = [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in of_rows]
@@ -170,7 +214,7 @@ def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading
     usable = not obstacle or (not file.named and bool(command.arguments("--channel")) and not backwards)
     description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
     source = f"({recording.kind}, {counted(len(recording.channels), 'channel')})"
-    lines = [filled(f"{file.path.name}: {description}, because {file.kind.why} {source}."), ""]
+    lines = [filled(f"{file.name}: {description}, because {file.kind.why} {source}."), ""]
     lines += [*describe_channels(recording), *describe_recorded(recordings, obstacle)]
     lines += [*(note for note in notes if note not in lines), ""]
     lines += describe_commands([command.with_options("--missing", missing)], usable)
@@ -210,9 +254,9 @@ def _describe_table(
         usable: Whether the command can fit it as it stands.
     """
     assert file.table is not None
-    title = f"{file.path.name}: {_kind_in_words(len(file.table.rows), data)}, because {file.kind.why}."
+    title = f"{file.name}: {_kind_in_words(len(file.table.rows), data)}, because {file.kind.why}."
     if file.kind.other:
-        title = f"{file.path.name}: a table of readings or a recording; {file.kind.why}."
+        title = f"{file.name}: a table of readings or a recording; {file.kind.why}."
     lines = [filled(title), "", _column_table(file, columns_of_kind(file.kind.kind))]
     if data is not None:
         lines += ["", *describe_first_and_last_rows(data)]

@@ -107,9 +107,10 @@ def describe_as_read(path: Path, reading: Reading) -> str:
     page = read(path, **reading).description.model_dump(mode="json", exclude_defaults=True, by_alias=True)
     if channels := parse_channels(reading.get("channels", ())):
         sources = {quantity: source.model_dump(mode="json", exclude_defaults=True) for quantity, source in channels.items()}
-        recordings = {key: value for key, value in page["tables"].pop("recordings").items() if key != "files"}
+        recordings = {key: value for key, value in page["tables"].pop("recordings").items() if key not in ("files", "sheet")}
         page["tables"] |= {"recordings": recordings} if recordings else {}
-        page["recording"] = [{"file": path.name, "channels": sources}]
+        sheet = {"sheet": reading["sheet"]} if reading.get("sheet") else {}
+        page["recording"] = [{"file": path.name, **sheet, "channels": sources}]
     if not page["tables"]:
         page.pop("tables")
     return format_toml({"schema": SCHEMA, **page}, _REMARKS)
@@ -128,12 +129,13 @@ def inspect_files(paths: Sequence[Path], asker: Asker) -> list[MeasuredFile]:
     faults, measured_files = Faults(), list[MeasuredFile]()
     for path in paths:
         with faults.collect():
-            file = inspect_file(path)
-            if file.kind is None:
-                file = _ask_kind(file, asker)
-            assert file.kind is not None and file.kind.init_questions is not None
-            asker.say(f"{file.name} holds {file.kind.init_questions.holds}.")
-            measured_files.append(file)
+            sheets, remarks = inspect_file(path)
+            for remark in remarks:
+                asker.report(remark)
+            for file in [sheet if sheet.kind else _ask_kind(sheet, asker) for sheet in sheets]:
+                assert file.kind is not None and file.kind.init_questions is not None
+                asker.say(f"{file.name} holds {file.kind.init_questions.holds}.")
+                measured_files.append(file)
     asker.settle()
     for kind in {file.kind.name: file.kind for file in measured_files if file.kind}.values():
         files = [file.name for file in measured_files if file.kind is kind]
@@ -162,7 +164,7 @@ def _ask_kind(file: MeasuredFile, asker: Asker) -> MeasuredFile:
         choice_question(f"{file.name} has the columns {columns}. What does it hold?", options, default, reason)
     )
     if kind.takes_channels:
-        return inspect_recording(file.path, "its user says so")
+        return inspect_recording(file.path, "its user says so", file.sheet)
     file.kind = kind
     return file
 
@@ -184,10 +186,26 @@ def _table_entries(measured_files: Sequence[MeasuredFile]) -> dict[str, Any]:
                 f"the columns of {listed([file.name for file in group])} are not called alike; give them the same headings, or "
                 "put them into one file."
             )
-        files = [file.name for file in group]
-        where: dict[str, Any] = {"files": files} if len(files) > 1 else {"file": files[0]}
+        where = _files_and_sheets(group)
         tables[kind.name] = {**where, **settings, **({"columns": columns_by_file[0]} if columns_by_file[0] else {})}
     return tables
+
+
+def _files_and_sheets(group: Sequence[MeasuredFile]) -> dict[str, Any]:
+    """Return the keys of [tables] that name the files of a kind, and their sheets.
+
+    Raises:
+        DatasetError: Sheets of several workbooks have different titles.
+    """
+    files = list(dict.fromkeys(file.path.name for file in group))
+    sheets = list(dict.fromkeys(file.sheet for file in group))
+    if len(files) * len(sheets) != len(group):
+        raise DatasetError(
+            f"the sheets of {listed([file.name for file in group])} have different titles; give them the same, or leave a "
+            "file out."
+        )
+    entries: dict[str, Any] = {"files": files} if len(files) > 1 else {"file": files[0]}
+    return entries | ({"sheet": sheets[0] if len(sheets) == 1 else sheets} if any(sheets) else {})
 
 
 def _named_sources(file: MeasuredFile) -> dict[str, Any]:
@@ -202,7 +220,7 @@ def _recording_entries(
     entries = []
     angles = [contact["wrap_angle"]["column"] for contact in layout.contacts if "column" in contact["wrap_angle"]]
     for file in measured_files:
-        entry: dict[str, Any] = {"file": file.name}
+        entry: dict[str, Any] = {"file": file.path.name} | ({"sheet": file.sheet} if file.sheet else {})
         if layout.route:
             entry["at"] = _ask_length(file, layout, asker)
         for name in [] if layout.route else angles:

@@ -13,7 +13,7 @@ from bowdenfit.files.headings import Quantity, find_candidates
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import FORCES, columns_of_kind
 from bowdenfit.kinds.kind import Kind
-from bowdenfit.kinds.lone_file import FileColumn, LoneFile, understand, understand_recording
+from bowdenfit.kinds.lone_file import FileColumn, LoneFile, understand, understand_recording, understand_sheets
 from bowdenfit.kinds.table_files import WantedColumn
 from bowdenfit.questions.start.question import Asker, choice_question, number_question, unit_question, yes_no_question
 from bowdenfit.units import ColumnSource
@@ -38,6 +38,7 @@ class MeasuredFile:
         assigned: Headings of the columns that are known.
         settings: Other settings of the file in the description.
         has_clock: Whether a recording says when its samples were taken.
+        sheet: Title of its sheet where the workbook has several; else empty.
     """
 
     path: Path
@@ -49,11 +50,12 @@ class MeasuredFile:
     assigned: dict[str, str] = field(default_factory=dict)
     settings: dict[str, object] = field(default_factory=dict)
     has_clock: bool = True
+    sheet: str = ""
 
     @property
     def name(self) -> str:
-        """Its name."""
-        return self.path.name
+        """Its name, with that of its sheet."""
+        return f"{self.path.name}, sheet {shown(self.sheet)}" if self.sheet else self.path.name
 
     @property
     def holds(self) -> str:
@@ -122,19 +124,30 @@ class MeasuredFile:
         return known
 
 
-def inspect_file(path: Path) -> MeasuredFile:
-    """Inspect a file: its columns, and the kind that their headings and units say.
+def inspect_file(path: Path) -> tuple[list[MeasuredFile], list[str]]:
+    """Inspect a file, or each sheet of a workbook: its columns, and the kind that their headings and units say.
 
-    Args:
-        path: The file.
+    Returns:
+        The file, or the sheets that hold measurements; and why other sheets are left out, in sentences.
 
     Raises:
         DatasetError: It cannot be read.
     """
-    lone = understand(path)
+    sheets, reasons = understand_sheets(path)
+    if not sheets:
+        return [_open_file(understand(path))], []
+    files = [_open_file(sheet) for sheet in sheets.values()]
+    measured = [file for file in files if file.kind is not None] or files
+    left_out = [f"Sheet {shown(title)} of {path.name} is left out. {reason}" for title, reason in reasons.items()]
+    left_out += [f"{file.name}, is left out. Its headings do not say what it holds." for file in files if file not in measured]
+    return measured, left_out
+
+
+def _open_file(lone: LoneFile) -> MeasuredFile:
+    """Return a file of which nothing is assigned yet."""
     if lone.recording is not None:
         return _open_recording(lone)
-    file = MeasuredFile(path, lone.signals, None, lone.kind.why)
+    file = MeasuredFile(lone.path, lone.signals, None, lone.kind.why, sheet=lone.sheet)
     fitting = _fitting_kinds(file)
     matching = [kind for kind in fitting if kind.name == lone.kind.kind] or fitting
     file.kind = matching[0] if len(matching) == 1 and not lone.kind.other else None
@@ -142,18 +155,19 @@ def inspect_file(path: Path) -> MeasuredFile:
     return file
 
 
-def inspect_recording(path: Path, why: str) -> MeasuredFile:
+def inspect_recording(path: Path, why: str, sheet: str = "") -> MeasuredFile:
     """Inspect a recording: its channels.
 
     Raises:
         DatasetError: It cannot be read.
     """
-    return _open_recording(understand_recording(path, why))
+    return _open_recording(understand_recording(path, why, sheet=sheet))
 
 
 def _open_recording(lone: LoneFile) -> MeasuredFile:
     """Return a recording of which nothing is assigned yet."""
-    return MeasuredFile(lone.path, lone.signals, KINDS[lone.kind.kind], lone.kind.why, has_clock=lone.has_clock)
+    kind = KINDS[lone.kind.kind]
+    return MeasuredFile(lone.path, lone.signals, kind, lone.kind.why, has_clock=lone.has_clock, sheet=lone.sheet)
 
 
 def _fitting_kinds(file: MeasuredFile) -> list[Kind[Any]]:

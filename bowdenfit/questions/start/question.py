@@ -67,6 +67,10 @@ class Asker(Protocol):
         """Say what was understood without asking."""
         ...
 
+    def report(self, sentence: str) -> None:
+        """Report what is left out, whoever is there."""
+        ...
+
     def settle(self) -> None:
         """Refuse here what was not answered, before later questions build on it."""
         ...
@@ -76,7 +80,7 @@ class Unattended:
     """Answer without a person: refuse together all that the files do not say; proposed defaults do not count as answers."""
 
     def __init__(self) -> None:
-        self.faults = Faults()
+        self.faults, self.left_out = Faults(), list[str]()
 
     def ask(self, question: Question[Answer]) -> Answer:
         """Return the default; where it is only proposed, or missing, note the fault and go on with it or an example."""
@@ -86,6 +90,10 @@ class Unattended:
 
     def say(self, sentence: str) -> None:
         """Say nothing."""
+
+    def report(self, sentence: str) -> None:
+        """Keep what is left out, to be printed behind what was written."""
+        self.left_out.append(sentence)
 
     def settle(self) -> None:
         """Refuse what is not said.

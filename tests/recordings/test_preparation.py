@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import isotonic_regression
 from scipy.signal import savgol_filter
 
+import bowdenfit as bf
 from bowdenfit.description import ForceLimits, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.questions.simulate.bench import (
@@ -19,7 +20,7 @@ from bowdenfit.questions.simulate.bench import (
     MotorProfile,
     simulate_recording,
 )
-from bowdenfit.recordings.preparation import hysteresis, prepare
+from bowdenfit.recordings.preparation import average_recording, hysteresis, inspect_parts, prepare
 from bowdenfit.recordings.preparation.blocks import estimate_bandwidth, main_frequency
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread_repeated
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, _touched, estimate_delay
@@ -33,7 +34,7 @@ from bowdenfit.recordings.preparation.noise import (
     quantum_of,
 )
 from bowdenfit.recordings.preparation.segments import Rests, Segments, play_along_rows
-from bowdenfit.recordings.recording import RawRecording
+from bowdenfit.recordings.recording import RawRecording, Recordings
 from bowdenfit.recordings.strokes import find_strokes
 
 EXPONENT, DELAY, RANGE = 0.24, 0.02, 500.0
@@ -562,3 +563,35 @@ def test_a_recording_whose_blocks_would_hold_pulling_and_returning_is_refused():
     assert "lasts 2,000 s, too long for forces that go up and down every 4 s" in " ".join(str(refused.value).split())
     assert "recordings of at most 1,4" in str(refused.value)
     assert prepare(up_and_down(2000), Preparation(delay="none", block=seconds(0.2)))[1].block == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("length", "count", "part_length"), [(1400, 1, 1400), (1900, 2, 950), (20_000, 8, 1000)])
+def test_a_recording_with_too_many_cycles_is_cut_into_parts_whose_loops_are_as_wide(length, count, part_length):
+    parts = inspect_parts(up_and_down(length, rate=20), ON)
+    assert len(parts) == count
+    assert all(np.ptp(part.together.time) == pytest.approx(part_length, rel=0.05) for part in parts)
+    assert ("was cut into" in " ".join(parts[0].remarks)) == (count > 1)
+    assert ("are left out" in " ".join(parts[0].remarks)) == (length > 2000)
+    for part in (parts[0], parts[-1]):
+        assert abs(part.delay.value) < 0.1
+        blocks, _ = average_recording(part)
+        assert find_strokes(blocks, "long.csv", "up and down").exponent == pytest.approx(EXPONENT, rel=0.03)
+
+
+def test_the_parts_of_a_long_recording_are_one_mounting(tmp_path):
+    raw = up_and_down(1900, rate=20)
+    columns = np.column_stack([raw.input_time, raw.input_force, raw.output_force])
+    path = tmp_path / "long.csv"
+    np.savetxt(path, columns, "%.3f", ",", header="time (s),input_force (N),output_force (N)", comments="")
+    recordings = bf.read(path, wrap_angle=(180, "deg")).measurements.table(Recordings)
+    assert [item.name for item in recordings.items] == ["long, part 1 of 2", "long, part 2 of 2"]
+    assert {item.run for item in recordings.items} == {"long"}
+    assert recordings.items[1].blocks.time[0] > 940
+
+
+def test_a_part_of_a_long_recording_without_samples_is_left_out_and_reported():
+    raw = up_and_down(3900, rate=20)
+    raw.output_force[(raw.input_time > 900) & (raw.input_time < 2100)] = np.nan
+    parts = inspect_parts(raw, ON)
+    assert [part.raw.name[-11:] for part in parts] == ["part 1 of 4", "part 3 of 4", "part 4 of 4"]
+    assert "part 2 of 4 is left out, because none of its samples is good" in " ".join(parts[1].remarks)

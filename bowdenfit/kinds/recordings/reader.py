@@ -21,7 +21,13 @@ from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.angle_channels import refuse_other_angle
 from bowdenfit.recordings.forces import separate_joined_clocks, to_recording
 from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED, rows_where
-from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
+from bowdenfit.recordings.preparation import (
+    NO_DELAY_OF_LOOPS,
+    Inspected,
+    average_recording,
+    inspect_parts,
+    inspect_recording,
+)
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, RANGE
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
@@ -78,10 +84,10 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
             f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
             "mm/s or both in r/min."
         )
-    prepared, delay_sd = _prepare_files(files)
+    parts, prepared, delay_sd = _prepare_files(files)
     items = tuple(
-        _make_recording(description, f, *parts)
-        for f, parts in zip(files, _keep_first_loop_remark(prepared), strict=True)
+        _make_recording(description, part, *averaged)
+        for part, averaged in zip(parts, _keep_first_loop_remark(prepared), strict=True)
     )
     unit, loop = next(iter(units), ""), description.cable.kind == "loop"
     recordings = Recordings(description.angle_columns, items, unit, delay_sd, loop)
@@ -107,9 +113,8 @@ class _File:
     remarks: tuple[str, ...] = ()
     shift: ClockShift | None = None
 
-
-def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
-    """Prepare every recording with one delay; return them and the standard error of that delay [s].
+def _prepare_files(files: Sequence[_File]) -> tuple[list[_File], list[tuple[Blocks, Account]], float]:
+    """Prepare every recording, or the parts of a long one, with one delay; return them and the standard error of that [s].
 
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
@@ -117,13 +122,12 @@ def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]]
     Two loggers are started anew for each recording, which keeps its own delay. The largest standard error then stands for all:
     errors that do not average out are the wider interval.
     """
-    inspections = [inspect_recording(f.raw, f.settings) for f in files]
-    pairs = list(zip(files, inspections, strict=True))
+    pairs = [pair for file in files for pair in _inspect_parts(file)]
     delays = [i.delay for f, i in pairs if not f.shift and i.settings.delay == "estimated" and i.delay.sd > 0]
     values, sds_of_delays = np.array([d.value for d in delays]), np.array([d.sd for d in delays])
     pooled = _pool_delays(values, sds_of_delays) if delays and np.ptp(values) < 2 * RANGE else None
     sds = [pooled[1]] if pooled else [f.delay_sd for f in files if not f.shift]
-    prepared = []
+    prepared = list[tuple[Blocks, Account]]()
     for file, inspection in pairs:
         if file.shift is None:
             prepared.append(average_recording(inspection, pooled if inspection.settings.delay == "estimated" else None))
@@ -133,7 +137,18 @@ def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]]
         sd = file.delay_sd or account.delay_sd
         sds.append(sd if sd > 0 else 0.0)
         prepared.append((blocks, _state_shift(file, account, sd or np.nan)))
-    return prepared, max(sds, default=0.0)
+    return [file for file, _ in pairs], prepared, max(sds, default=0.0)
+
+
+def _inspect_parts(file: _File) -> list[tuple[_File, Inspected]]:
+    """Return a recording, or parts of a long one, all of one run; those with stated phases or two clocks stay whole."""
+    if file.entry.strokes or file.shift:
+        return [(file, inspect_recording(file.raw, file.settings))]
+    parts = inspect_parts(file.raw, file.settings)
+    if len(parts) == 1:
+        return [(file, parts[0])]
+    entry = file.entry.model_copy(update={"run": file.entry.run or file.raw.name})
+    return [(replace(file, raw=part.raw, entry=entry), part) for part in parts]
 
 
 def _state_shift(file: _File, account: Account, sd: float) -> Account:

@@ -4,6 +4,7 @@ The steps, one file each: `checks`, `flags`, `tare`, `delay`, `blocks`; each is 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -16,6 +17,7 @@ from bowdenfit.recordings.preparation.blocks import (
     CommonClock,
     average_blocks,
     choose_block_samples,
+    cut_into_windows,
     estimate_bandwidth,
     main_frequency,
     refuse_too_long,
@@ -108,6 +110,51 @@ def inspect_recording(raw: RawRecording, settings: Preparation) -> Inspected:
     cleaned = _clean(raw, settings)
     together = _together(raw, cleaned, settings, 0.0)
     return Inspected(raw, settings, remarks, cleaned, together, _delay(raw, cleaned, together, settings))
+
+
+def inspect_parts(raw: RawRecording, settings: Preparation) -> tuple[Inspected, ...]:
+    """Return the steps before averaging of a recording, or of the parts of one with more cycles than its blocks can show.
+
+    The parts have equal lengths and their own delays. Of a recording with very many cycles they are apart from each other: more
+    cycles say little more of a mounting.
+    """
+    remarks, cleaned = check_recording(raw), _clean(raw, settings)
+    together = _together(raw, cleaned, settings, 0.0)
+    windows = [] if raw.loop or settings.block != "auto" else cut_into_windows(together, _main_frequency(together))
+    if not windows:
+        return (Inspected(raw, settings, remarks, cleaned, together, _delay(raw, cleaned, together, settings)),)
+    parts, remarks = list[Inspected](), (*remarks, _describe_cut(raw, together, windows))
+    for i, window in enumerate(windows, start=1):
+        some = slice(*np.searchsorted(raw.velocity_time, window).tolist())
+        name = f"{raw.name}, part {i} of {len(windows)}"
+        part = replace(raw, name=name, velocity_time=raw.velocity_time[some], velocity=raw.velocity[some])
+        of_part = replace(cleaned, input=cleaned.input.between(*window), output=cleaned.output.between(*window))
+        common = _together(part, of_part, settings, 0.0)
+        if not np.any(common.fault == GOOD):
+            remarks = (*remarks, f"{name} is left out, because none of its samples is good.")
+            continue
+        parts.append(Inspected(part, settings, remarks, of_part, common, _delay(part, of_part, common, settings)))
+        remarks = ()
+    return tuple(parts)
+
+
+def _main_frequency(common: CommonClock) -> float:
+    """Return the frequency at which the forces move most [Hz]; 0 where they do not, or no sample is good."""
+    good = common.fault == GOOD
+    if not good.any():
+        return 0.0
+    return main_frequency(pieces.Filled(common.input_force, good), pieces.Filled(common.output_force, good), 1 / common.step)
+
+
+def _describe_cut(raw: RawRecording, common: CommonClock, windows: Sequence[tuple[float, float]]) -> str:
+    """Return how a recording was cut, in a sentence."""
+    whole, length = float(np.ptp(common.time)), windows[0][1] - windows[0][0]
+    between = whole - len(windows) * length
+    unused = f"; {between:,.0f} s between them are left out: more cycles say little more of a mounting" if between > 1 else ""
+    return (
+        f"{raw.name} lasts {whole:,.0f} s, with more cycles than one recording may have. It was cut into {len(windows)} parts "
+        f"of {length:,.0f} s, which count as one mounting{unused}."
+    )
 
 
 def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | None = None) -> tuple[Blocks, Account]:

@@ -16,6 +16,7 @@ from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, KINDS, SATURAT
 from bowdenfit.recordings.recording import Blocks
 from bowdenfit.types import ChosenVector, Flags, Labels, OtherVector, Positions, Vector
 
+MOST_PARTS = 8  # judged: of one long recording; 2000 cycles say far more of a mounting than mountings scatter
 MOST_BLOCKS = 4000  # judged: the play operator is a loop over them in every step of a sampler
 FEWEST_BLOCKS = 200  # judged: that are left, where the recording has as many samples
 _NOISE_IN_BAND = 0.1  # judged: noise of a mean over half the friction band
@@ -79,6 +80,23 @@ def choose_block_samples(
     if main > 0:
         most = min(most, int(1 / (_BLOCKS_OF_PERIOD * main * common.step)))
     return max(1, min(wanted, most), int(np.ceil((_span(common) / common.step + 1) / MOST_BLOCKS)))
+
+
+def cut_into_windows(common: CommonClock, main: float) -> list[tuple[float, float]]:
+    """Return start and end [s] of the parts of a recording that its blocks cannot show as a whole; none of any other.
+
+    Args:
+        common: Both channels.
+        main: Frequency at which they move most [Hz]; 0 where they do not.
+    """
+    span = _span(common)
+    if span * main * _LEAST_OF_PERIOD <= MOST_BLOCKS:
+        return []
+    longest = MOST_BLOCKS / (_BLOCKS_OF_PERIOD * main)
+    count = min(int(np.ceil(span / longest)), MOST_PARTS)
+    length = min(span / count, longest)
+    starts = common.time[0] + np.linspace(0, span - length, count)
+    return [(float(start), float(start) + length) for start in starts]
 
 
 def refuse_too_long(file: str, name: str, common: CommonClock, main: float) -> None:

@@ -28,6 +28,11 @@ class Sampled:
     fault: Labels
     gap: Flags
 
+    def between(self, start: float, end: float) -> "Sampled":
+        """Return the samples from one time up to another [s]."""
+        part = slice(*np.searchsorted(self.time, (start, end)).tolist())
+        return Sampled(self.time[part], self.force[part], self.fault[part], self.gap[part])
+
 
 def step_of(time: Vector) -> float:
     """Return the time between samples [s]: the mean step, gaps left out."""

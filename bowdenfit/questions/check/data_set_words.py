@@ -10,6 +10,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.display import Block, Preformatted, Title, blocks_of, render_text, separate
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.files.tables import AS_DECIMALS
 from bowdenfit.frames import Frame
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.descriptions import order_groups
@@ -165,6 +166,11 @@ def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
         "intervals are too narrow: leave them out, or put in what was measured."
         for sentence in copies
     )
+
+
+def describe_assumed_decimals(dataset: Dataset) -> list[str]:
+    """Return what was assumed of columns whose numbers could be thousands, which the page of a fit must state."""
+    return [remark for remark in dataset.measurements.remarks if AS_DECIMALS in remark]
 
 
 def describe_bench_faults(dataset: Dataset) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.kinds import describe_reading
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import elastic_overview
+from bowdenfit.questions.check.data_set_words import describe_assumed_decimals
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
 from bowdenfit.questions.error_budget import KEY_ROLES, error_budget, widening_sentence
@@ -108,10 +109,10 @@ def _sentences(fit: Record, purpose: Purpose) -> tuple[list[str], list[str]]:
         # the lengths that are good enough
         n_first = 1 if fit.dataset.description.route is not None and purpose == "design" else 0
         answer = [f"{name}: {first}", *further[:n_first], widening_sentence(fit), *further[n_first:]]
-        verdict = [*reasons_to_trust(fit), suggest_next_step(fit)]
+        verdict = [*reasons_to_trust(fit), *describe_assumed_decimals(fit.dataset), suggest_next_step(fit)]
     else:
         answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]
-        verdict = [f"What they would say: {first}"]
+        verdict = [f"What they would say: {first}", *describe_assumed_decimals(fit.dataset)]
     return list(filter(None, answer)), list(filter(None, verdict))
 
 

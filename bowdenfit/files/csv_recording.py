@@ -8,7 +8,7 @@ import csv
 import io
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,9 @@ from bowdenfit.files.text_file import (
     split_cells,
     text_size,
 )
+from bowdenfit.files.units_in_cells import find_units_in_cells, take_units_from_cells, take_units_off
 from bowdenfit.units import is_unit
+from bowdenfit.words import shown
 
 LARGEST_BYTES = 2 << 30  # judged: some 80 million rows of a time and two forces, a day at 1 kHz
 _FIRST_BYTES = 1 << 18  # judged: far more than the lines over the data and `_FIRST_LINES` rows have
@@ -83,6 +85,7 @@ class Sheet:
         layout: Headings and kinds of the columns.
         metadata: The lines above the data.
         above: Why the other rows above the data are not read, and what they say, by their numbers.
+        units: The unit behind each number of a column, by its position; and of a column of units, which holds nothing else.
     """
 
     encoding: str
@@ -91,6 +94,7 @@ class Sheet:
     layout: Layout
     metadata: tuple[str, ...]
     above: dict[int, tuple[str, str]]
+    units: dict[int, str] = field(default_factory=dict)
 
 
 def read(path: Path) -> ChannelFile:
@@ -168,6 +172,8 @@ def _read_plain(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarra
                 chunksize=_ROWS_AT_ONCE,
             )
             for chunk in chunks:
+                if any(kinds[i] != "text" or (chunk[i] != unit).any() for i, unit in sheet.units.items()):
+                    return None  # row by row, which takes units off, or names the row
                 if not filled:  # joining pieces would need twice the memory
                     whole = {i: np.empty(rows, _choose_precision(chunk[i], rows)) for i in used if kinds[i] != "date"}
                 for i, values in whole.items():
@@ -198,9 +204,32 @@ def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, lis
     def cells() -> Iterator[Sequence[str] | None]:
         for text in lines_between(path, sheet.encoding, start, stop):
             filled = [""] if is_blank(text) else split_cells(text, sheet.separator)
+            filled = take_units_off(filled, sheet.units) if sheet.units else filled
             yield None if comment_mark(text) else filled if text.strip(spaces) else []
 
-    return SheetRows(path.name, sheet.layout, cells(), count_rows_before(path, start) + 1, True, before)
+    first = count_rows_before(path, start) + 1
+    return SheetRows(path.name, sheet.layout, _check_units(path.name, sheet, cells(), first), first, True, before)
+
+
+def _check_units(
+    file: str, sheet: Sheet, rows: Iterator[Sequence[str] | None], first: int
+) -> Iterator[Sequence[str] | None]:
+    """Yield rows in which each column of units holds the one of the first rows.
+
+    Raises:
+        DatasetError: One holds another, whose numbers would be read in the wrong unit.
+    """
+    constant = {i: unit for i, unit in sheet.units.items() if sheet.layout.kinds[i] == "text"}
+    for row, cells in enumerate(rows, start=first):
+        for i, unit in constant.items() if cells else ():
+            text = cells[i].strip() if cells and i < len(cells) else unit
+            if text not in (unit, ""):
+                raise DatasetError(
+                    f"{file}, row {row}: the unit in the column {shown(sheet.layout.name(i))} is {shown(text)} there, and "
+                    f"{shown(unit)} in the rows before. The usual cause is a meter that changes its range. Export the "
+                    "recording with one unit, or convert these rows."
+                )
+        yield cells
 
 
 def _is_cut(lines: Sequence[Line], separator: str) -> bool:
@@ -224,6 +253,8 @@ def read_start(path: Path, data: bytes) -> Sheet:
     if len(lines) > 1 and not lines[-1].ended:
         lines = lines[:-1]
     separator, rows = split_rows(lines, path.name, _COMMENTS, _HEADING_LINES)
+    units = find_units_in_cells(rows)
+    rows = [replace(row, cells=take_units_off(row.cells, units)) for row in rows] if units else rows
     layout = find_layout(rows, choose_decimal(rows), path.name)
     if layout is None:
         raise DatasetError(
@@ -235,11 +266,12 @@ def read_start(path: Path, data: bytes) -> Sheet:
     layout = _take_units_of_labview(_fit_layout(path, layout, below, separator, above), separator, above)
     texts = {line.row: (ABOVE, " ".join(line.text.split())) for line in above if line.row not in layout.over}
     reasons = explain_lines([line for line in above if line.row in texts], rows, texts, _COMMENTS)
+    layout, units = take_units_from_cells(path.name, layout, rows, units)
     width = len(layout.kinds)
     for line in above:
         if reasons.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width:
             refuse_other_separator(path.name, line.row, line.text.strip(), width, layout.numeric)
-    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), reasons)
+    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), reasons, units)
 
 
 def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:

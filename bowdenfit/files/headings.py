@@ -118,8 +118,8 @@ def is_units_row(cells: Sequence[str]) -> bool:
     return bool(written) and all(is_unit(unit) for unit in written) and not all(map(names_time, written))
 
 
-def refuse_two_units(place: str, headings: Sequence[str], units: Sequence[str]) -> None:
-    """Refuse a unit in the row below a heading that is another than the one in the heading.
+def refuse_two_units(place: str, headings: Sequence[str], units: Sequence[str], source: str = "the row of units") -> None:
+    """Refuse a unit below a heading, in a row of units or in the cells, that is another than the one in the heading.
 
     Raises:
         DatasetError: There is such a pair.
@@ -128,8 +128,8 @@ def refuse_two_units(place: str, headings: Sequence[str], units: Sequence[str]) 
         unit = heading_of(heading).unit
         if unit and below and is_unit(unit) and is_unit(below) and (reason := differing_units(unit, below)):
             raise DatasetError(
-                f"{place}: the heading {shown(' '.join(heading.split()))} is in {unit}, and the row of units says "
-                f"{below} below it, {reason}; correct the one that is wrong, or delete the row of units."
+                f"{place}: the heading {shown(' '.join(heading.split()))} is in {unit}, and {source} says "
+                f"{below} below it, {reason}; correct the one that is wrong, or delete {source}."
             )
 
 

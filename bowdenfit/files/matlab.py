@@ -34,6 +34,9 @@ _OBJECTS = (
     "(save their columns as plain vectors, for example with table2struct(T, 'ToScalar', true))"
 )
 _NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
+_VALUES, _LABELS = ("values", "Data"), ("label", "Name")  # fields of signals by Simulink and by dSPACE
+_LONGEST_LABEL = 200  # judged: characters
+_MOST_ELEMENTS = 1000  # judged: of an array of structures, each of which is a channel
 _COMPRESSED = 15  # type number of a compressed element
 
 
@@ -78,6 +81,18 @@ def read(path: Path) -> ChannelFile:
         variables = _read_hdf5(path) if modern else _read_classic(path)
     clocked, remarks = assign_interval_times(assign_group_clocks(variables.channels), variables.settings)
     return make_channel_file(path, "MATLAB", assign_only_clock(clocked), variables.left_out, remarks)
+
+
+def _name_field(owner: str, key: str, label: str) -> str:
+    """Return the name of a field of a structure: that of its signal where a label states it, as in out.signals(1).values.
+
+    The field Data of a structure X next to Y has the times of Y, as ControlDesk of dSPACE writes them.
+    """
+    group, _, own = owner.rpartition(".")
+    if key not in _VALUES or not (label or own == "X"):
+        return f"{owner}.{key}"
+    name = "time" if own == "X" else label.replace(".", "_")
+    return f"{group}.{name}" if group else name
 
 
 def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -135,8 +150,10 @@ def _sort_in_structures(name: str, value: np.ndarray, variables: _Variables) -> 
     """Fields of a structure, or of each in an array of them."""
     for number, structure in enumerate(value.flat, start=1):
         owner = name if value.size == 1 else f"{name}({number})"
+        texts = [np.asarray(getattr(structure, key)) for key in _LABELS if key in structure._fieldnames]
+        label = next((str(text.flat[0]) for text in texts if text.dtype.kind == "U" and text.size), "")
         for key in structure._fieldnames:
-            _sort_in(f"{owner}.{key}", getattr(structure, key), variables)
+            _sort_in(_name_field(owner, key, label), getattr(structure, key), variables)
 
 
 def _n_numbers(path: Path, listing: list[tuple[str, tuple[int, ...], str]]) -> int:
@@ -197,13 +214,44 @@ def _iterate_stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: s
         elif "MATLAB_sparse" in member.attrs:
             left_out.add(name, "they are sparse")
         elif isinstance(member, h5py.Group):
+            yield from _iterate_elements(member, name)
             yield from _iterate_stored(member, left_out, seen, f"{name}.")
         elif kind == "char":
             left_out.add(name, _TEXT)
+        elif prefix and key in (*_VALUES, *_LABELS) and member.dtype.kind == "O" and kind != "cell":
+            continue  # a field of an array of structures
         elif is_numeric(member.dtype) and kind in ("", *_NUMERIC):
-            yield name, member
+            yield _name_field(prefix[:-1], key, _read_label(group)) if prefix else name, member
         else:
             left_out.add(name, _CELLS if member.dtype.kind == "O" else "they are complex numbers or objects")
+
+
+def _iterate_elements(structures: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Yield the numbers in each of an array of structures, whose fields are lists of references."""
+    for key in _VALUES:
+        field_ = structures.get(key)
+        if not isinstance(field_, h5py.Dataset) or h5py.check_ref_dtype(field_.dtype) is None or _class(field_) == "cell":
+            continue
+        labels = next((structures[key] for key in _LABELS if isinstance(structures.get(key), h5py.Dataset)), None)
+        texts = labels[()].ravel() if labels is not None and labels.size == field_.size else [None] * field_.size
+        for i, (reference, text) in enumerate(zip(field_[()].ravel()[:_MOST_ELEMENTS], texts, strict=False), start=1):
+            member = structures.file[reference] if reference else None
+            if isinstance(member, h5py.Dataset) and is_numeric(member.dtype) and not (member.external or member.is_virtual):
+                yield _name_field(f"{name}({i})", key, _read_text(structures.file, text)), member
+
+
+def _read_label(structure: Any) -> str:
+    """Return the label of a single structure; empty without one."""
+    return next((_read_text(None, structure[key]) for key in _LABELS if isinstance(structure.get(key), h5py.Dataset)), "")
+
+
+def _read_text(file: Any, stored: Any) -> str:
+    """Return a text, or one that a reference leads to; empty where it is none."""
+    if isinstance(stored, h5py.Reference):
+        stored = file[stored] if stored else None
+    if not isinstance(stored, h5py.Dataset) or _class(stored) != "char" or not 0 < stored.size <= _LONGEST_LABEL:
+        return ""
+    return "".join(map(chr, stored[()].T.ravel(order="F")))
 
 
 def _class(member: Any) -> str:

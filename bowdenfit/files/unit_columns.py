@@ -14,15 +14,19 @@ from bowdenfit.units import conversion_factor, dimension_of
 _WORDS = {"unit", "units", "uom", "einheit", "einheiten", "unite", "unité", "unites", "unités", "unidad", "unidades", "unità"}
 
 
+def names_unit(heading: str) -> bool:
+    """Return whether a heading says that its column holds the units of the column before it."""
+    return plain_name(heading).rstrip("0123456789_") in _WORDS
+
+
 def _find_unit_columns(parts: TableParts) -> dict[int, list[str]]:
     """Return the units of columns of numbers that the column behind them says, one per row, by the position of the numbers."""
     units = dict[int, list[str]]()
     for i, name in enumerate(parts.headings.names):
-        word = plain_name(name).rstrip("0123456789_")
         cells = [row.cells[i].strip() if i < len(row.cells) else "" for row in parts.body]
         numbers = [row.cells[i - 1] for row in parts.body if i and i <= len(row.cells)]
         are_units = any(cells) and all(is_measured(f"1 {cell}") and not is_number(cell) for cell in cells if cell)
-        if word in _WORDS and i and are_units and any(map(is_measured, numbers)):
+        if names_unit(name) and i and are_units and any(map(is_measured, numbers)):
             units[i - 1] = cells
     return units
 

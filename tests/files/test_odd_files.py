@@ -1,8 +1,10 @@
 """Layouts that laboratories have sent, each beside a twin that must be read, or refused, as before."""
 
+import h5py
 import numpy as np
 import openpyxl
 import pytest
+import scipy.io
 
 import bowdenfit as bf
 from bowdenfit.files import read_channels
@@ -98,7 +100,7 @@ def test_a_unit_in_each_row_converts_its_number_and_one_that_measures_something_
 )
 def test_three_digits_behind_every_point_are_reported_where_they_may_be_thousands(tmp_path, text, doubtful):
     table = read_table(write(tmp_path, text))
-    assert sum("if they are thousands" in remark for remark in table.remarks) == doubtful
+    assert sum(remark.count("'F") for remark in table.remarks if "if these are thousands" in remark) == doubtful
 
 
 def rows_of_joined_clocks(blank_share=1.0):
@@ -206,3 +208,62 @@ def test_the_page_of_a_fit_states_that_numbers_that_may_be_thousands_were_read_w
     for decided in (";".join(["10.25", "7.1"]), ";".join(["0.250", "0.171"]), ";".join(["1002.500", "681.700"])):
         write(tmp_path, "\n".join(["Kraft Eingang [N];Kraft Ausgang [N]", *rows, decided]) + "\n")
         assert not [remark for remark in read_table(path).remarks if "three digits" in remark]
+
+
+def write_mat73(path, labelled=True):
+    """As MATLAB does with -v7.3: a structure with time, whose signals are lists of references."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        refs, out = file.create_group("#refs#"), file.create_group("out")
+        out.attrs["MATLAB_class"] = np.bytes_("struct")
+        out["time"] = TIME[None, :]
+        signals = out.create_group("signals")
+        for key, values in (("values", (INPUT, OUTPUT)), ("label", ("F_in", "F_out"))):
+            if key == "values" or labelled:
+                stored = signals.create_dataset(key, (2, 1), dtype=h5py.ref_dtype)
+                for i, value in enumerate(values):
+                    numbers = value[None, :] if key == "values" else np.frombuffer(value.encode("utf-16-le"), "<u2")[:, None]
+                    refs[f"{key}{i}"] = numbers
+                    if key == "label":
+                        refs[f"{key}{i}"].attrs["MATLAB_class"] = np.bytes_("char")
+                    stored[i, 0] = refs[f"{key}{i}"].ref
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    return path
+
+
+def write_dspace(path):
+    signals = np.zeros((1, 2), dtype=[("Name", object), ("Data", object)])
+    signals[0, 0], signals[0, 1] = ("F_in", INPUT), ("F_out", OUTPUT)
+    scipy.io.savemat(path, {"rec": {"X": {"Name": "", "Data": TIME}, "Y": signals, "RTProgram": "bench"}})
+    return path
+
+
+@pytest.mark.parametrize(("make", "group"), [(write_mat73, "out"), (write_dspace, "rec")])
+def test_signals_of_simulink_and_dspace_have_their_labels_and_the_common_time(tmp_path, make, group):
+    file = read_channels(make(tmp_path / "log.mat"))
+    channels = {channel.name: channel for channel in file.channels}
+    assert set(channels) == {f"{group}.F_in", f"{group}.F_out", f"{group}.time"}
+    np.testing.assert_allclose(channels[f"{group}.F_out"].values, OUTPUT)
+    np.testing.assert_allclose(channels[f"{group}.F_in"].time, TIME)
+
+
+def test_signals_without_labels_are_numbered(tmp_path):
+    names = [channel.name for channel in read_channels(write_mat73(tmp_path / "log.mat", labelled=False)).channels]
+    assert names[:2] == ["out.signals(1).values", "out.signals(2).values"]
+
+
+@pytest.mark.parametrize("as_column", [False, True])
+def test_units_behind_the_numbers_of_a_recording_are_read_and_must_be_the_same_in_every_row(tmp_path, as_column):
+    behind = ",N" if as_column else " N"
+    heads = "time (s),F_in,Unit,F_out,Unit" if as_column else "time (s),F_in,F_out"
+    rows = [f"{t:.2f},{a:.3f}{behind},{b:.3f}{behind}" for t, a, b in zip(TIME, INPUT, OUTPUT, strict=True)] * 12
+    rows = [f"{0.05 * i:.2f},{row.partition(',')[2]}" for i, row in enumerate(rows)]
+    file = read_channels(write(tmp_path, "\n".join([heads, *rows]) + "\n"))
+    assert [(channel.name, channel.unit) for channel in file.channels] == [("time", "s"), ("F_in", "N"), ("F_out", "N")]
+    np.testing.assert_allclose(file.channels[1].values[: len(INPUT)], INPUT, atol=1e-3)
+    rows[2000] = rows[2000].replace("N", "mN")
+    with pytest.raises(bf.DatasetError, match=r"row 2002"):
+        read_channels(write(tmp_path, "\n".join([heads, *rows]) + "\n"))
+    contradicting = heads.replace("F_in", "F_in (kN)")
+    with pytest.raises(bf.DatasetError, match="kN"):
+        read_channels(write(tmp_path, "\n".join([contradicting, *rows[:100]]) + "\n"))

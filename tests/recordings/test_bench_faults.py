@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from creeping_rope import Truth, record
 from recorded_benches import RecordedBench, channels, draw_bench, write
 
 import bowdenfit as bf
@@ -74,6 +75,14 @@ def test_a_drag_is_named_unless_the_fit_has_one(usual):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_healthy_bench_has_no_fault(usual, seed):
     assert find_bench_fault(recording(RecordedBench(length=60, **usual), seed)) is None
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 25.0])
+@pytest.mark.parametrize("exponent", [0.2, 0.4])
+def test_a_rope_that_creeps_is_no_crosstalk_and_crosstalk_is_no_creep(stiffness, exponent):
+    assert find_bench_fault(record(Truth(exponent, stiffness), 100.0, 1)) is None
+    crossed = RecordedBench(length=60, rate=50, wave="sine", load=1.0, crosstalk=0.05, noise=0.001)
+    assert find_bench_fault(recording(crossed)).kind == "crosstalk"
 
 
 def test_a_zero_that_drifts_is_no_jump():

@@ -259,7 +259,8 @@ class RopeStrokes:
         """Return the exponent and center by the medians of the two branches, drag, and remarks."""
         del correlation
         ratio = np.log(loop.force_in / loop.force_out)
-        return *_plain_loop(ratio, state), loop.lost, _remarks(name, strokes, loop)
+        exponent, center = _plain_loop(ratio, state)
+        return exponent, center, loop.lost, _remarks(name, strokes, center)
 
 
 def _explain_other_ratio(loop: Hysteresis, file: str, name: str) -> DatasetError:
@@ -276,7 +277,23 @@ def _explain_other_ratio(loop: Hysteresis, file: str, name: str) -> DatasetError
     )
 
 
-def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
+def describe_off_center(name: str, center: float) -> str:
+    """Return that a loop is off center by more than cells usually disagree, with causes and remedies; empty if it is not.
+
+    Args:
+        name: Name of the recording.
+        center: Middle of its loop, as the log ratio of the forces; 0 without both strokes.
+    """
+    if abs(center) <= 2.5 * _GAIN_SD:
+        return ""
+    return (
+        f"{name}: the hysteresis loop is off center by {percent(center, 1, '+')} of the force; the usual cause is "
+        "a load cell with a wrong calibration or tare: give [sensors] input_gain_error_sd and output_gain_error_sd, or an "
+        "offset_sd, or tare the recording."
+    )
+
+
+def _remarks(name: str, strokes: set[int], center: float) -> tuple[str, ...]:
     remarks = []
     if not strokes:
         remarks.append(
@@ -288,12 +305,8 @@ def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
             f"{name} is {which} throughout and has no loop: a gain error, or a zero that is wrong, cannot be separated from "
             "friction by it, and where it slides is known by the motor's motion or by both forces changing together."
         )
-    if abs(loop.center) > 2.5 * _GAIN_SD and len(strokes) == 2:
-        remarks.append(
-            f"{name}: the hysteresis loop is off center by {percent(loop.center, 1, '+')} of the force; the usual cause is "
-            "a load cell with a wrong calibration or tare: give [sensors] input_gain_error_sd and output_gain_error_sd, or an "
-            "offset_sd, or tare the recording."
-        )
+    if len(strokes) == 2 and (sentence := describe_off_center(name, center)):
+        remarks.append(sentence)
     return tuple(remarks)
 
 

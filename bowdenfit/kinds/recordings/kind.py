@@ -19,6 +19,7 @@ from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, W
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.recordings.bench_faults import BenchFault, describe_bench_fault, find_bench_fault
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Recording, Recordings
+from bowdenfit.recordings.rope_strokes import describe_off_center
 from bowdenfit.types import Vector
 from bowdenfit.units import speed_dimension
 from bowdenfit.words import counted, filled, listed, narrow_table
@@ -283,7 +284,10 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def bench_faults(self, table: Recordings, description: Description) -> list[str]:
-        """Return a sentence on each kind of fault, of the recording that shows it most clearly."""
+        """Return a sentence on each kind of fault, of the recording that shows it most clearly.
+
+        A loop that is off center by more than cells disagree is one, unless errors of the gains or offsets are fitted.
+        """
         if table.loop:
             return []
         options = {option.strip() for option in description.friction_model.split("+")}
@@ -294,7 +298,12 @@ class RecordingKind(FrictionKind[Recordings]):
             fault = find_bench_fault(recording, expects_drag=expects_drag, expects_creep=expects_creep)
             if fault and (fault.kind not in clearest or fault.significance > clearest[fault.kind][0].significance):
                 clearest[fault.kind] = fault, recording.file
-        return [describe_bench_fault(*clear) for clear in clearest.values()]
+        sentences = [describe_bench_fault(*clear) for clear in clearest.values()]
+        if description.fits_offsets or description.sensors.gain_sd:
+            return sentences
+        farthest = max(table.items, key=lambda recording: abs(recording.strokes.center))
+        off_center = describe_off_center(farthest.name, farthest.strokes.center)
+        return [*sentences, off_center] if off_center else sentences
 
     @override
     def with_bench_error(self, table: Recordings, error: BenchError) -> Recordings:

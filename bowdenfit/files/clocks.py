@@ -21,7 +21,10 @@ from bowdenfit.types import Vector
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
 
-_TIME_WORDS = {"time", "timestamp", "datetime", "elapsed", "zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"}
+_TIME_WORDS = {
+    *("time", "timestamp", "stamp", "datetime", "elapsed"),
+    *("zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"),
+}
 _UNITS_AS_NAMES = {
     "ms": "ms millis milliseconds millisekunden",
     "us": "us µs μs micros microseconds",

@@ -13,7 +13,7 @@ from bowdenfit.files.headings import find_candidates, heading_of, split_brackets
 from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, find_stated_angle, guess_file_kind
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, FileColumn, LoneFile
-from bowdenfit.recordings.forces import SLOWEST
+from bowdenfit.recordings.forces import likely_clock_unit
 from bowdenfit.units import ColumnSource, dimension_of, is_unit, multiple_of, weight_of
 from bowdenfit.words import listed, shown
 
@@ -119,15 +119,17 @@ def _make_recording_command(file: LoneFile, always: bool = False) -> FitCommand:
     signals = [column for column in file.signals if column is not clock]
     options, provided, missing = _name_forces(signals, "--channel", file.named, always, in_order=True)
     if clock is not None:
-        unit = "s" if np.diff(clock.values[:_STEPS]).max() < SLOWEST else "ms"
+        unit = likely_clock_unit(float(np.diff(clock.values[:_STEPS]).max()))
         options.append(("--channel", _naming("time", clock.name, unit)))
         provided.append(f"{shown(clock.name)} is the time in {unit}, as the file does not state")
     elif not file.has_clock and "time" not in file.named:
         options.append(("--channel", "time=1000Hz"))
         provided.append("1000 Hz is its sampling rate, which the file does not state")
     elif file.doubtful_clock and "time" not in file.named:
-        options.append(("--channel", _naming("time", file.doubtful_clock, "ms")))
-        provided.append(f"{shown(file.doubtful_clock)} is in milliseconds, as the file does not state")
+        counted = next(column for column in file.columns if column.name == file.doubtful_clock)
+        unit = likely_clock_unit(float(np.nanmedian(np.diff(counted.values))))
+        options.append(("--channel", _naming("time", file.doubtful_clock, unit)))
+        provided.append(f"{shown(file.doubtful_clock)} is in {unit}, as the file does not state")
     angle, of_angle = _stated_angle_options(file)
     renamed = _state_columns(file, "--channel")
     return FitCommand(file.path, (*angle, *renamed, *options), (*of_angle, *provided), missing=tuple(missing))

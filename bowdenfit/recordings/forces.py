@@ -26,6 +26,8 @@ from bowdenfit.words import quoted, shown
 
 _FORCES = ("input_force", "output_force")
 FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
+_CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_CLOCK_WORDS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
 _MOST_TOGETHER, _FEWEST_ROWS = 0.5, 0.9  # shares of rows with both forces, and with one, in a table that joins two clocks
 _SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
@@ -361,9 +363,14 @@ def _read_clock_without_unit(file: ChannelFile, channel: Channel) -> tuple[Chann
     clock = next((c for c in file.channels if c.name == channel.clock), None)
     if clock is None or clock.unit or channel.time is None or len(channel.time) < FEW_SAMPLES:
         return None
-    if np.nanmax(np.abs(clock.values)) >= YEARS:
+    if np.nanmin(np.abs(clock.values)) >= YEARS:
         return None
-    return clock, float(np.nanmedian(np.diff(channel.time))), float(np.nanmax(channel.time) - np.nanmin(channel.time))
+    return clock, float(np.nanmedian(np.diff(clock.values))), float(np.nanmax(clock.values) - np.nanmin(clock.values))
+
+
+def likely_clock_unit(step: float) -> str:
+    """Return the unit that a clock without one is likely to count in, by its typical step."""
+    return next((unit for unit, factor in _CLOCK_UNITS.items() if step * factor < SLOWEST), "ns")
 
 
 def clock_in_doubt(file: ChannelFile, channel: Channel) -> Channel | None:
@@ -382,8 +389,11 @@ def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
         return
     clock, step, length = read
     if step >= SLOWEST:
-        units = ["ms", "s"]
-        last = f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s"
+        units = [likely_clock_unit(step), "s"]
+        last = (
+            f"{length / 3600:.2g} hours at one sample each {step:g} s, in {_CLOCK_WORDS[units[0]]} "
+            f"{length * _CLOCK_UNITS[units[0]]:.4g} s"
+        )
     elif 0 < length < _SHORTEST:
         units = ["day", "min", "s"]
         last = (

@@ -267,3 +267,16 @@ def test_units_behind_the_numbers_of_a_recording_are_read_and_must_be_the_same_i
     contradicting = heads.replace("F_in", "F_in (kN)")
     with pytest.raises(bf.DatasetError, match="kN"):
         read_channels(write(tmp_path, "\n".join([contradicting, *rows[:100]]) + "\n"))
+
+
+@pytest.mark.parametrize(("heading", "start"), [("stamp", 1_700_000_000_000_000_000), ("stamp", 0), ("timestamp", 0)])
+def test_stamps_in_nanoseconds_are_read_or_asked_about_with_the_right_unit(run, tmp_path, heading, start):
+    rows = [f"{start + round(t * 1e9)},{a:.3f},{b:.3f}" for t, a, b in zip(TIME, INPUT, OUTPUT, strict=True)]
+    path = write(tmp_path, "\n".join([f"{heading},input_force_N,output_force_N", *rows]) + "\n")
+    code, out, _ = run("check", path)
+    assert "NAME" not in out
+    if start:
+        assert code == 0
+    else:
+        assert code == 2 and f"--channel time={heading}:ns" in out and "in nanoseconds 15.95 s" in " ".join(out.split())
+        assert run("check", path, "--channel", f"time={heading}:ns")[0] == 0

@@ -133,7 +133,7 @@ def _check_clock(file: str, name: str, time: Vector) -> None:
     if step and not SHORTEST_STEP <= step <= LONGEST_STEP:
         raise DatasetError(
             f"{file}: the samples of {name} are {step:.3g} s apart, which no bench records; the usual cause is a wrong unit of "
-            "the time, or another column than the time. State it: --channel time=NAME:UNIT."
+            "the time, or another column than the time. State the right ones by --channel time."
         )
     repeated = _share_repeated(time)
     if repeated > _MOST_REPEATED:
@@ -182,7 +182,7 @@ def _check_forces(file: str, name: str, force: Vector) -> None:
     if typical > LARGEST_FORCE:
         raise DatasetError(
             f"{file}: {name} reads {typical:.4g} N in its middle, far more than a Bowden cable bears; the usual cause is "
-            f"a wrong unit, or counts of the converter. State the unit: --channel {name}=NAME:UNIT."
+            f"a wrong unit, or counts of the converter. State the unit behind the name of the channel, by --channel {name}."
         )
 
 

@@ -199,12 +199,12 @@ def test_sheets_that_are_not_read_are_named_and_a_workbook_of_one_says_nothing(t
 def test_the_page_of_a_fit_states_that_numbers_that_may_be_thousands_were_read_with_decimals(run, tmp_path):
     rows = [f"{load:.3f};{load * 0.68 + 0.001 * i:.3f}" for i, load in enumerate(np.linspace(2, 5, 9))]
     path = write(tmp_path, "\n".join(["Kraft Eingang [N];Kraft Ausgang [N]", *rows]) + "\n")
-    stated = "under 'Kraft Eingang [N]' and 'Kraft Ausgang [N]' has three digits behind its mark, as in '2.000', and is read"
+    sentence = "under 'Kraft Eingang [N]' and 'Kraft Ausgang [N]' has three digits behind its mark, as in '2.000', and is read"
     options = "--wrap-angle", "180deg", "--no-mcmc", "--no-figures", "--seed", "1"
     _, out, _ = run("fit", path, *options, "-o", tmp_path / "fit")
-    assert stated in " ".join(out.split()) and len(out.splitlines()) <= 25
+    assert sentence in " ".join(out.split()) and len(out.splitlines()) <= 25
     _, out, _ = run("summary", tmp_path / "fit")
-    assert stated in " ".join(out.split())
+    assert sentence in " ".join(out.split())
     for decided in (";".join(["10.25", "7.1"]), ";".join(["0.250", "0.171"]), ";".join(["1002.500", "681.700"])):
         write(tmp_path, "\n".join(["Kraft Eingang [N];Kraft Ausgang [N]", *rows, decided]) + "\n")
         assert not [remark for remark in read_table(path).remarks if "three digits" in remark]

@@ -25,7 +25,7 @@ from typing_extensions import override
 
 from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive, make_drive
 from bowdenfit.cable.sensors import LoadCells
-from bowdenfit.kinds.recordings.blocks import group_blocks, pad_columns, standing_share
+from bowdenfit.kinds.recordings.blocks import group_blocks, output_drift, pad_columns, standing_share
 from bowdenfit.kinds.recordings.whole_recordings import (
     Data,
     RopeBlocksData,
@@ -55,6 +55,7 @@ class TurnsData(RopeBlocksData):
         part_velocity: Velocity there, (blocks, parts, recordings).
         phase_start, phase_stop: First block of the phase, and the first after it, (blocks, recordings).
         common: Part of the phase's mean that is one error [1], (blocks, recordings).
+        widening: What a delay adds to half the width of the loop, on the scale of the exponent [1/s], (recordings,).
     """
 
     part_force: DataArray
@@ -62,6 +63,7 @@ class TurnsData(RopeBlocksData):
     phase_start: DataArray
     phase_stop: DataArray
     common: DataArray
+    widening: DataArray
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,14 @@ class TurnsTerm(WholeRecordingsTerm):
         step = _repeat(data.step) / len(_PARTS)
         drive = make_drive(self.cable, values, angles, jnp.reshape(data.part_velocity, step.shape), step=step)
         return drive, angles, variance
+
+    @override
+    def _typical_exponent(self, drive: RopeDrive, data: Data) -> PerRecording:
+        """Return the exponent that the width of the loop shows, which an error of the delay changes.
+
+        A rope that creeps seems late, so its delay is estimated with a larger error than that of others.
+        """
+        return super()._typical_exponent(drive, data) + LoadCells.of(drive.values).late(data.widening)
 
     @override
     def _follow(
@@ -123,7 +133,15 @@ def stack_turns(
         np.stack([pad_columns([blocks[which][part] for blocks in divided]) for part in range(len(_PARTS))], axis=1)
         for which in range(2)
     )
-    return TurnsData(**vars(data), part_force=force, part_velocity=velocity, **of_phases)
+    widening = np.array([_measure_widening(recording) for recording in recordings.items])
+    return TurnsData(**vars(data), part_force=force, part_velocity=velocity, widening=widening, **of_phases)
+
+
+def _measure_widening(recording: Recording) -> float:
+    """Return what a delay of the output adds to half the width of the loop, by how fast the output changes in contact [1/s]."""
+    contact = recording.strokes.contact
+    slides = contact != 0
+    return float(np.mean((contact * output_drift(recording))[slides])) if slides.any() else 0.0
 
 
 def _find_phases(recording: Recording) -> dict[str, np.ndarray]:

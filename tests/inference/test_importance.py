@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from creeping_rope import NOISE, Truth, creep, pulled
+from creeping_rope import Truth, write_bench
 from scipy import stats
 
 import bowdenfit as bf
@@ -18,17 +18,6 @@ from bowdenfit.questions.summary.methods import sampler_text
 
 NAMES = ("along", "bent", "far")
 SEEDS = 20
-CREEPING = """schema = 1
-name = "rope"
-friction_model = "dahl"
-reference_velocity = { value = 20, unit = "mm/s" }
-[[contact]]
-name = "sheath"
-friction = "mu"
-wrap_angle = { value = 2, unit = "rad" }
-[tables.recordings]
-files = "rope*.csv"
-"""
 FAILURE_RATE = 1e-3  # that one of all the comparisons of a correct sampler fails
 
 
@@ -95,7 +84,7 @@ def test_loop_gets_the_answer_of_walkers(tmp_path):
 
 @pytest.mark.extended
 def test_creeping_rope_is_drawn_by_importance_sampling(tmp_path):
-    write_creeping_bench(tmp_path / "bench")
+    write_bench(tmp_path / "bench", "dahl", Truth(0.3, 25.0))
     fit = bf.fit(tmp_path / "bench", seed=1, output=tmp_path / "fit", figures=False)
     assert fit.converged
     assert fit.posterior.sampler == "importance" and fit.posterior.pareto_k < 0.7
@@ -104,21 +93,3 @@ def test_creeping_rope_is_drawn_by_importance_sampling(tmp_path):
     stored = bf.load(tmp_path / "fit")
     assert stored.posterior.pareto_k == fit.posterior.pareto_k
     assert sampler_text(stored.summary()["sampler"]).startswith("importance sampling, 4 batches of ")
-
-
-def write_creeping_bench(folder):
-    """Two recordings of one rope with Dahl's friction, by a simulator that shares no code with the likelihood."""
-    folder.mkdir()
-    generator, time = np.random.default_rng(2), np.arange(0, 11, 0.01)
-
-    def motion(instants):
-        return pulled(instants, periods=(2.5, 1.75, 1.25))
-
-    force, speed = motion(time)
-    output = creep(Truth(0.3, 25.0), time, motion)
-    for n in (1, 2):
-        noise = NOISE * generator.standard_normal((2, len(time)))
-        columns = np.column_stack([time, force + noise[0], output + noise[1], speed])
-        heading = "time_s,input_force_N,output_force_N,velocity_mm/s"
-        np.savetxt(folder / f"rope{n}.csv", columns, "%.4f", ",", header=heading, comments="")
-    (folder / "cable.toml").write_text(CREEPING)

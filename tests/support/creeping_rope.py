@@ -22,6 +22,17 @@ from bowdenfit.recordings.strokes import find_strokes
 CONTACT = {"name": "sheath", "friction": "mu", "wrap_angle": {"column": "angle", "nominal": {"value": 90, "unit": "deg"}}}
 ANGLE, SPEED = 2.0, 20.0  # rad; mm/s, of reference
 NOISE = 0.15  # N, a sample
+DESCRIPTION = """schema = 1
+name = "rope"
+friction_model = "{}"
+reference_velocity = {{ value = 20, unit = "mm/s" }}
+[[contact]]
+name = "sheath"
+friction = "mu"
+wrap_angle = {{ value = 2, unit = "rad" }}
+[tables.recordings]
+files = "rope*.csv"
+"""
 LOAD_DAMPER = 2e-5  # s; the output comes later by that
 
 
@@ -109,3 +120,21 @@ def model_recordings(recordings: list[Recording], friction_model: str, delay_sd:
     )
     table = Recordings(("angle",), tuple(recordings), "mm/s", delay_sd)
     return build_model(Dataset(description, Measurements((table,)), {}))
+
+
+def write_bench(folder, friction_model, truth, slower=1):
+    """Write two recordings of one rope to a new folder, with their description: of 11 s each, or of so many times as slow."""
+    folder.mkdir()
+    generator, time = np.random.default_rng(2), np.arange(0, 11 * slower, 0.01)
+
+    def motion(instants):
+        return pulled(instants, periods=(2.5 * slower, 1.75 * slower, 1.25 * slower))
+
+    force, speed = motion(time)
+    output = creep(truth, time, motion)
+    for n in (1, 2):
+        noise = NOISE * generator.standard_normal((2, len(time)))
+        columns = np.column_stack([time, force + noise[0], output + noise[1], speed])
+        heading = "time_s,input_force_N,output_force_N,velocity_mm/s"
+        np.savetxt(folder / f"rope{n}.csv", columns, "%.4f", ",", header=heading, comments="")
+    (folder / "cable.toml").write_text(DESCRIPTION.format(friction_model))

@@ -32,6 +32,7 @@ from bowdenfit.questions.identify.judgment import (
 )
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import has_candidates, rests_on_one_mounting
+from bowdenfit.questions.recorded.presliding import describe_wrong_delay
 from bowdenfit.questions.summary.curve_departures import describe_refuted_families
 from bowdenfit.questions.summary.usable_answers import UsableAnswers, find_usable_answers
 from bowdenfit.results.record import Record, cached_per_fit
@@ -172,12 +173,17 @@ def assess_fit(fit: Record) -> Verdict:
         CUT_OFF: describe_cut_off_readings(fit.dataset),
         COARSE: describe_coarse_readings(fit),
         # Copies make the least departure certain.
-        NOT_DESCRIBED: () if copies else describe_bench_faults(fit.dataset) + describe_lack_of_fit(fit),
+        NOT_DESCRIBED: () if copies else _describe_misfits(fit),
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
     to_leave = describe_coefficients_to_leave(fit) if usable.holds else ""
     weighted = fit.sampled is not None and fit.sampled.sampler == "importance"
     return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit), usable, to_leave, weighted)
+
+
+def _describe_misfits(fit: Record) -> tuple[str, ...]:
+    """Describe what the model leaves out: faults of the bench, a wrong delay, and lack of fit."""
+    return describe_bench_faults(fit.dataset) + _sentences(describe_wrong_delay(fit)) + describe_lack_of_fit(fit)
 
 
 def assess_for(fit: Record, purpose: Purpose) -> Verdict:

@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.special import wrightomega
 
 from bowdenfit.recordings.preparation.hysteresis import (
     Deviations,
@@ -184,6 +183,8 @@ def _creep(log_input: Vector, friction: float, exponent: float, stiffness: float
         friction: Log ratio of input and output of the first.
         exponent, stiffness: Friction exponent, and k.
     """
+    from scipy.special import wrightomega  # takes half a second to load, and few recordings need it
+
     frictions, friction = [friction], float(np.clip(friction, -exponent, exponent))
     for step in np.diff(log_input):
         sign = 1.0 if step >= 0 else -1.0

@@ -58,7 +58,7 @@ def test_the_program_alone_shows_its_help_and_that_something_is_missing(run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("fit", "x", "--seet", "1"), "Unknown option: --seet. Did you mean --set? See bowdenfit fit --help."),
+        (("fit", "x", "--seet", "1"), "Unknown option: --seet. Did you mean --sheet? See bowdenfit fit --help."),
         (("fti",), 'Unknown command "fti". Did you mean "fit"?'),
         (("fit", "x", "y"), "Unexpected argument y. See bowdenfit fit --help."),
         (("fit", "x", "--noise", "none"), '"none" for --noise. Choose from: "normal", "student".'),

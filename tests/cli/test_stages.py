@@ -95,7 +95,7 @@ def outputs(monkeypatch):
 
 
 class Progress:
-    steps, sampler, r_hat, ess = 300, "emcee", None, None
+    steps, sampler, r_hat, ess, seconds_left = 300, "emcee", None, None, 180.0
 
 
 def test_a_notebook_shows_stages_and_progress_in_one_line_and_the_last_progress_in_the_end(outputs):
@@ -109,7 +109,7 @@ def test_a_notebook_shows_stages_and_progress_in_one_line_and_the_last_progress_
     in_order = r"compiling the posterior, 00:00.*sampling with emcee 300 steps, 00:00.*drawing efficiency, 00:00.*"
     assert re.search(in_order, " ".join(outputs[0]))
     assert outputs[0].count("drawing efficiency, 00:00") > 1  # its clock runs
-    assert outputs[0][-1] == "sampling with emcee 300 steps, 00:00"
+    assert outputs[0][-1] == "sampling with emcee 300 steps, 00:00, at least 3 min left"
     assert LOGGER.getEffectiveLevel() > logging.INFO and LOGGER.propagate
 
 

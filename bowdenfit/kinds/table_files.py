@@ -79,8 +79,8 @@ class Source:
     @property
     def sheets(self) -> tuple[str, ...]:
         """Titles of the sheets that are read of each workbook; one that is empty where none is stated."""
-        stated = self.settings.sheet
-        return (stated,) if isinstance(stated, str) else stated or ("",)
+        titles = self.settings.sheet
+        return (titles,) if isinstance(titles, str) else titles or ("",)
 
     @property
     def columns(self) -> dict[str, ColumnSource]:

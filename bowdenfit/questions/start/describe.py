@@ -186,8 +186,8 @@ def _table_entries(measured_files: Sequence[MeasuredFile]) -> dict[str, Any]:
                 f"the columns of {listed([file.name for file in group])} are not called alike; give them the same headings, or "
                 "put them into one file."
             )
-        where = _files_and_sheets(group)
-        tables[kind.name] = {**where, **settings, **({"columns": columns_by_file[0]} if columns_by_file[0] else {})}
+        place = _files_and_sheets(group)
+        tables[kind.name] = {**place, **settings, **({"columns": columns_by_file[0]} if columns_by_file[0] else {})}
     return tables
 
 

@@ -81,16 +81,16 @@ def _count_lines(blocks: Sequence[Block]) -> int:
 
 def _shorten_to(answer: list[str], verdict: list[str], room: int) -> list[str]:
     """Return sentences in at most so many lines: the first, the verdict, and of the rest of the answer what has room."""
-    first, *others = answer
+    first, *further = answer
     if _count_lines([*answer, *verdict]) <= room:
         return [*answer, *verdict]
-    left, kept = room - _count_lines([first, *verdict]) - 1, list[str]()
-    for sentence in others:
+    left, fitting = room - _count_lines([first, *verdict]) - 1, list[str]()
+    for sentence in further:
         if (left := left - _count_lines([sentence])) < 0:
             break
-        kept.append(sentence)
-    more = f"[{counted(len(others) - len(kept), 'sentence')} more: bowdenfit summary --full]"
-    sentences = [first, *kept, more, *verdict]
+        fitting.append(sentence)
+    more = f"[{counted(len(further) - len(fitting), 'sentence')} more: bowdenfit summary --full]"
+    sentences = [first, *fitting, more, *verdict]
     while _count_lines(sentences) > room:  # the last sentence loses its last line
         *sentences, last = sentences
         sentences += [" ".join(filled(last).splitlines()[:-1])] if "\n" in filled(last) else []

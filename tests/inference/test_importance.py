@@ -14,6 +14,7 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.importance import compile_densities, sample
 from bowdenfit.inference.least_squares import MaximumPosterior
+from bowdenfit.models import Model
 from bowdenfit.questions.summary.methods import sampler_text
 
 NAMES = ("along", "bent", "far")
@@ -93,3 +94,19 @@ def test_creeping_rope_is_drawn_by_importance_sampling(tmp_path):
     stored = bf.load(tmp_path / "fit")
     assert stored.posterior.pareto_k == fit.posterior.pareto_k
     assert sampler_text(stored.summary()["sampler"]).startswith("importance sampling, 4 batches of ")
+
+
+@pytest.mark.extended
+def test_walkers_follow_where_weighted_draws_do_not_suffice(monkeypatch):
+    """The on-body data set is beyond a mixture's reach: a funnel of four readings and three coefficients."""
+    monkeypatch.setattr(Model, "is_slow", True)
+    fit = bf.fit("datasets/on-body-exoskeleton", seed=1, figures=False)
+    assert fit.converged
+    assert fit.posterior.sampler == "emcee" and fit.posterior.pareto_k is None
+
+
+@pytest.mark.extended
+def test_stated_importance_sampling_is_refused_where_it_does_not_suffice():
+    fit = bf.fit("datasets/on-body-exoskeleton", seed=1, sampler="importance", figures=False)
+    assert not fit.converged and fit.posterior.pareto_k > 0.7
+    assert "Fit again with --sampler emcee" in " ".join(str(fit).split())

@@ -54,6 +54,9 @@ class Person:
     def say(self, sentence):
         pass
 
+    def report(self, sentence):
+        pass
+
     def settle(self):
         pass
 

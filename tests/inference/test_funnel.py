@@ -60,7 +60,7 @@ class Funnel:
         self.angles, self.read = angles, read
         coefficients = [Parameter(f"mu{i}", "", "", "friction", Normal(0.0, 1.0)) for i in range(COUNT)]
         space = ParameterSpace((*coefficients, Parameter("tau", "", "", "noise", LogNormal(MEDIAN, LOG_SD))))
-        self.posterior = LogDensity(SimpleNamespace(space=space, terms=(Readings(angles, read),)))
+        self.posterior = LogDensity(SimpleNamespace(space=space, terms=(Readings(angles, read),), is_slow=False))
 
     def quantile_of_tau(self, share: np.ndarray) -> np.ndarray:
         """Of tau in z: the readings are normal with covariance tau^2 + angles angles^T."""

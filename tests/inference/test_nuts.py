@@ -233,5 +233,5 @@ def test_the_summary_says_how_trajectories_went(saved):
 
 
 def test_an_unknown_sampler_is_a_sentence():
-    with pytest.raises(bf.UsageError, match="sampler = 'gibbs' is unknown; choose one of emcee, nuts, both"):
+    with pytest.raises(bf.UsageError, match="sampler = 'gibbs' is unknown; choose one of emcee, nuts, importance, both"):
         bf.fit(YARN, sampler="gibbs")

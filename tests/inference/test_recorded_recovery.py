@@ -151,7 +151,7 @@ def prepared(description: Description, cable: Cable) -> Dataset:
         _File(as_read(recording, entry.file), entry, settings, sd, "")
         for entry, recording in zip(description.recording, cable.recorded, strict=True)
     ]
-    parts, delay_sd = _prepare_files(files)
+    _, parts, delay_sd = _prepare_files(files)
     item = tuple(_make_recording(description, f, *p) for f, p in zip(files, parts, strict=True))
     return Dataset(description, Measurements((Recordings(description.angle_columns, item, "", delay_sd),)), {})
 

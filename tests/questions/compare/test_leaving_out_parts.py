@@ -68,7 +68,7 @@ def _without(rows, i, unit):
             groups += np.array_split(mask, 8) if unit == "load" else [np.array([k]) for k in np.sort(mask)]
     selected = ~np.isin(np.arange(len(run)), groups[i])
     arrays = {name: value[selected] for name, value in vars(rows).items() if name not in ("angles", "unused")}
-    return replace(rows, **arrays, angles={name: value[selected] for name, value in rows.angles.items()})
+    return replace(rows, **arrays, angles=rows.angles.select(selected))
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ def test_wrong_delay_is_named_and_the_one_to_state_is_right(tmp_path):
     write_bench(tmp_path / "rope", "lugre", RISES, slower=2)
     fit = bf.fit(tmp_path / "rope", mcmc=False, figures=False)
     (sentence,) = [reason for reason in fit.verdict().reasons if "shifted" in reason]
-    stated = float(re.search(r"value=(-?[\d.]+)", sentence)[1])
-    assert abs(stated) < 8  # there is none
+    delay_to_state = float(re.search(r"value=(-?[\d.]+)", sentence)[1])
+    assert abs(delay_to_state) < 8  # there is none
     description = tmp_path / "rope" / "cable.toml"
     delay = re.search(r"delay=(\{.*?\})", sentence)[1].replace("=", " = ")
     description.write_text(f"{description.read_text()}prepare = {{ delay = {delay} }}\n")

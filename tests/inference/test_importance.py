@@ -68,7 +68,7 @@ def test_seed_decides_the_draws():
     assert not np.array_equal(draw(bent, NAMES, 3).z, draw(bent, NAMES, 4).z)
 
 
-@pytest.mark.extended
+@pytest.mark.slow
 def test_loop_gets_the_answer_of_walkers(tmp_path):
     fits = [
         bf.fit("datasets/synthetic-haptic-loop", seed=1, sampler=sampler, output=tmp_path / sampler, figures=False)
@@ -83,7 +83,7 @@ def test_loop_gets_the_answer_of_walkers(tmp_path):
             assert abs(np.quantile(by_weights, probability) - np.quantile(by_walkers, probability)) < 0.2 * sd, name
 
 
-@pytest.mark.extended
+@pytest.mark.slow
 def test_creeping_rope_is_drawn_by_importance_sampling(tmp_path):
     write_bench(tmp_path / "bench", "dahl", Truth(0.3, 25.0))
     fit = bf.fit(tmp_path / "bench", seed=1, output=tmp_path / "fit", figures=False)

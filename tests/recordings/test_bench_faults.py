@@ -103,7 +103,7 @@ def test_check_warns_of_it_and_the_verdict_ends_with_the_same_sentence(tmp_path)
 
 
 @pytest.mark.extended
-def test_the_verdict_knows_that_a_loop_is_off_center_by_the_sentence_of_check(tmp_path):
+def test_the_verdict_knows_that_a_loop_is_off_center_by_the_sentence_of_check(run, tmp_path):
     folder = write(RecordedBench(length=60, rate=50), tmp_path / "bench", 0)
     description = folder / "cable.toml"
     wrong_gain = description.read_text() + "\n[sensors]\noutput_ratio = 0.9\n"
@@ -111,6 +111,7 @@ def test_the_verdict_knows_that_a_loop_is_off_center_by_the_sentence_of_check(tm
     data = bf.check(folder)
     (warning,) = data.warnings
     assert "the hysteresis loop is off center by +10" in warning
+    assert " ".join(run("check", folder)[1].split()).count("the hysteresis loop is off center by +10") == 1
     assert warning in bf.fit(folder, mcmc=False, seed=1).verdict().reasons
     description.write_text(wrong_gain + "input_gain_error_sd = 0.1\noutput_gain_error_sd = 0.1\n")
     assert not bf.check(folder).warnings

@@ -68,7 +68,7 @@ def describe_data_set(dataset: Dataset) -> str:
 def data_set_blocks(dataset: Dataset) -> list[Block]:
     """Return what was understood of a data set."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = [f"Warning: {warning}" for warning in collect_warnings(dataset)]
+    warnings = collect_warnings(dataset)
     state = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
     contacts = [
         f"{c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}{_describe_angle_source(c, description)}"
@@ -82,7 +82,7 @@ def data_set_blocks(dataset: Dataset) -> list[Block]:
     lines = [line for heading, table_lines in described if not heading for line in table_lines]
     lines += [f"note: {description.cable.sharp_bend}"] if description.cable.sharp_bend else []
     sections = [("Measurements", lines), *((heading, table_lines) for heading, table_lines in described if heading)]
-    sections[-1][1].extend(f"note: {remark}" for remark in measurements.remarks)
+    sections[-1][1].extend(f"note: {remark}" for remark in measurements.remarks if remark not in warnings)
     rows = (line for words in describe_rows(dataset) for line in words.splitlines())
     return separate(
         [Title(description.name), f"Everything could be read. {state}"],
@@ -91,7 +91,7 @@ def data_set_blocks(dataset: Dataset) -> list[Block]:
         _list_lines("Friction coefficients", settings),
         *(_list_lines(heading, section_lines) for heading, section_lines in sections),
         ["Rows of the files:", Preformatted("\n".join(f"  {line}" for line in rows))],
-        warnings,
+        [f"Warning: {warning}" for warning in warnings],
     )
 
 

@@ -1,8 +1,8 @@
 """Workbooks with several sheets: each is listed, and none is read without a word."""
 
 import numpy as np
-import openpyxl
 import pytest
+from workbooks import write_workbook
 
 import bowdenfit as bf
 from bowdenfit.files import read_channels
@@ -11,17 +11,6 @@ from bowdenfit.files.tables import read_table
 MU = 0.12
 ANGLES = {300: 60, 340: 75, 380: 85, 420: 100, 460: 120, 500: 150}
 RUNS = [(run, load) for run in (1, 2, 3) for load in (20.0, 40.0, 60.0)]
-
-
-def write(path, sheets):
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for title, rows in sheets.items():
-        sheet = book.create_sheet(title)
-        for row in rows:
-            sheet.append(row)
-    book.save(path)
-    return path
 
 
 def angles():
@@ -51,7 +40,7 @@ def recording(as_text=False, seed=2):
 
 
 def test_angles_and_forces_on_two_sheets_are_fitted_by_what_init_writes(run, tmp_path):
-    path = write(tmp_path / "bench.xlsx", {"Winkel": angles(), "Kraft": forces(ANGLES), "Notizen": [["von Eva"]]})
+    path = write_workbook(tmp_path / "bench.xlsx", {"Winkel": angles(), "Kraft": forces(ANGLES), "Notizen": [["von Eva"]]})
     code, out, _ = run("check", path)
     assert code == 0 and "a workbook of 3 sheets" in out and f"bowdenfit init my-cable --from {path}" in out
     assert "wrap angles at 6 lengths" in out and "54 readings" in out and "--sheet Kraft" in out and "'Notizen'" in out
@@ -66,7 +55,7 @@ def test_angles_and_forces_on_two_sheets_are_fitted_by_what_init_writes(run, tmp
 
 
 def test_of_several_sheets_that_can_be_fitted_none_is_read_until_one_is_stated(run, tmp_path):
-    path = write(tmp_path / "bench.xlsx", {"Tag 1": forces([300]), "Tag 2": forces([500])})
+    path = write_workbook(tmp_path / "bench.xlsx", {"Tag 1": forces([300]), "Tag 2": forces([500])})
     code, out, _ = run("check", path)
     assert code == 2 and "--sheet 'Tag 1'" in out and "--sheet 'Tag 2'" in out
     with pytest.raises(bf.DatasetError, match="sheets that can be fitted, 'Tag 1', 'Tag 2'; state which, such as --sheet"):
@@ -79,7 +68,8 @@ def test_of_several_sheets_that_can_be_fitted_none_is_read_until_one_is_stated(r
 
 
 def test_forces_on_several_sheets_are_one_table_whose_mountings_stay_apart(run, tmp_path):
-    write(tmp_path / "bench_90deg.xlsx", {"Winkel": angles(), "Tag 1": forces([300, 340]), "Tag 2": forces([460, 500])})
+    sheets = {"Winkel": angles(), "Tag 1": forces([300, 340]), "Tag 2": forces([460, 500])}
+    write_workbook(tmp_path / "bench_90deg.xlsx", sheets)
     code, _, err = run("init", tmp_path / "cable", "--from", tmp_path / "bench_90deg.xlsx")
     assert code == 0, err
     data = bf.read(tmp_path / "cable")
@@ -89,7 +79,7 @@ def test_forces_on_several_sheets_are_one_table_whose_mountings_stay_apart(run, 
 
 
 def test_a_stated_sheet_is_read_alone_in_recordings_too(run, tmp_path):
-    path = write(tmp_path / "bench.xlsx", {"Lauf 1": recording(), "Lauf 2": recording(seed=3)})
+    path = write_workbook(tmp_path / "bench.xlsx", {"Lauf 1": recording(), "Lauf 2": recording(seed=3)})
     assert run("check", path)[0] == 2
     assert [channel.name for channel in read_channels(path, "Lauf 2").channels] == ["Zeit", "F_in", "F_out"]
     (tmp_path / "cable.toml").write_text(
@@ -108,9 +98,9 @@ def write_text(folder):
 
 
 def test_decimals_that_are_stored_as_text_are_read_and_reported_and_thousands_are_not(tmp_path):
-    file = read_channels(write(tmp_path / "text.xlsx", {"a": recording(as_text=True)}))
+    file = read_channels(write_workbook(tmp_path / "text.xlsx", {"a": recording(as_text=True)}))
     assert file.channels[0].values[1] == 0.02
     assert "stored as text with a comma" in " ".join(file.remarks)
     rows = [["time (s)", "F_in (N)"], *([i, f"{1 + i},000"] for i in range(9))]
     with pytest.raises(bf.DatasetError, match="no sheet with columns of numbers"):
-        read_channels(write(tmp_path / "thousands.xlsx", {"a": rows}))
+        read_channels(write_workbook(tmp_path / "thousands.xlsx", {"a": rows}))

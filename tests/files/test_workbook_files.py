@@ -3,11 +3,11 @@
 import datetime
 
 import numpy as np
-import openpyxl
 import pyarrow
 import pyarrow.parquet
 import pytest
 from three_columns import INPUT, OUTPUT, TIME, check
+from workbooks import write_workbook
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import channels, excel, parquet
@@ -15,26 +15,15 @@ from bowdenfit.files import channels, excel, parquet
 pytestmark = pytest.mark.extended
 
 
-def workbook(folder, sheets):
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for title, rows in sheets.items():
-        sheet = book.create_sheet(title)
-        for row in rows:
-            sheet.append(row)
-    book.save(folder / "run.xlsx")
-    return folder / "run.xlsx"
-
-
 TABLE = [["time (s)", "input_force (N)", "output_force (N)"], *map(list, zip(TIME, INPUT, OUTPUT, strict=True))]
 
 
 def test_a_workbook_with_one_sheet_has_plain_names(tmp_path):
-    check(excel.read(workbook(tmp_path, {"Sheet1": TABLE, "notes": [["by Eve"], ["cable 7"]]})))
+    check(excel.read(write_workbook(tmp_path / "run.xlsx", {"Sheet1": TABLE, "notes": [["by Eve"], ["cable 7"]]})))
 
 
 def test_a_workbook_with_several_sheets_has_the_sheet_before_the_names(tmp_path):
-    file = excel.read(workbook(tmp_path, {"a": TABLE, "b": [["cable", 7], *TABLE]}))
+    file = excel.read(write_workbook(tmp_path / "run.xlsx", {"a": TABLE, "b": [["cable", 7], *TABLE]}))
     assert [c.name for c in file.channels][2:4] == ["a/output_force", "b/time"]
     assert file.channels[4].clock == "b/time"
     np.testing.assert_array_equal(file.channels[5].values, OUTPUT)
@@ -42,7 +31,7 @@ def test_a_workbook_with_several_sheets_has_the_sheet_before_the_names(tmp_path)
 
 def test_pairs_of_columns_in_a_workbook_keep_their_own_clocks_and_lengths(tmp_path):
     rows = [[0.02 * i, i % 3, None, 0.04 * i if i < 6 else None, i % 2 if i < 6 else None] for i in range(9)]
-    file = excel.read(workbook(tmp_path, {"raw": [[None, 45, None, None, 90], *rows]}))
+    file = excel.read(write_workbook(tmp_path / "run.xlsx", {"raw": [[None, 45, None, None, 90], *rows]}))
     assert [c.name for c in file.channels] == ["time of 45", "45", "time of 90", "90"]
     assert [len(c.time) for c in file.channels[1::2]] == [9, 6]
     np.testing.assert_array_equal(file.channels[3].time, [0.04 * i for i in range(6)])
@@ -57,7 +46,8 @@ def test_two_rows_of_numbers_as_headings_and_statistics_below(tmp_path):
         [],
         [None, None, None, None],
     ]
-    file = excel.read(workbook(tmp_path, {"s": [[None, "Angle", 45, 45], [None, "Trial", 1, 2], *rows, *below]}))
+    sheet = [[None, "Angle", 45, 45], [None, "Trial", 1, 2], *rows, *below]
+    file = excel.read(write_workbook(tmp_path / "run.xlsx", {"s": sheet}))
     assert [c.name for c in file.channels] == ["time of 45 1", "45 1", "45 2"]
     assert {len(c.values) for c in file.channels} == {9}
     assert "ows 12 to 14 were left out" in file.remarks[0]
@@ -67,25 +57,25 @@ def test_text_among_the_numbers_of_the_only_sheet_is_refused(tmp_path):
     rows = [list(row) for row in TABLE]
     rows[3][1] = "slip"
     with pytest.raises(DatasetError, match="sheet 'a', row 4, column 'input_force': 'slip' is not a number"):
-        excel.read(workbook(tmp_path, {"a": rows}))
-    file = excel.read(workbook(tmp_path, {"a": rows, "b": TABLE}))
+        excel.read(write_workbook(tmp_path / "run.xlsx", {"a": rows}))
+    file = excel.read(write_workbook(tmp_path / "run.xlsx", {"a": rows, "b": TABLE}))
     assert "A sheet was left out" in file.remarks[0]
 
 
 def test_dates_in_a_workbook_are_clocks(tmp_path):
     start = datetime.datetime(2021, 2, 4, 14, 52)
     rows = [[start + datetime.timedelta(seconds=i / 2), force] for i, force in enumerate(INPUT)]
-    file = excel.read(workbook(tmp_path, {"a": [["Timestamp", "input_force [N]"], *rows]}))
+    file = excel.read(write_workbook(tmp_path / "run.xlsx", {"a": [["Timestamp", "input_force [N]"], *rows]}))
     np.testing.assert_allclose(file.channels[1].time, [0, 0.5, 1, 1.5, 2], atol=1e-6)
 
 
 def test_damaged_workbooks_and_those_without_numbers_are_refused(tmp_path):
-    whole = workbook(tmp_path, {"a": TABLE}).read_bytes()
+    whole = write_workbook(tmp_path / "run.xlsx", {"a": TABLE}).read_bytes()
     (tmp_path / "cut.xlsx").write_bytes(whole[: len(whole) * 6 // 10])
     with pytest.raises(DatasetError, match="cut off or damaged"):
         excel.read(tmp_path / "cut.xlsx")
     with pytest.raises(DatasetError, match="no sheet with columns of numbers"):
-        excel.read(workbook(tmp_path, {"a": [["hello"]]}))
+        excel.read(write_workbook(tmp_path / "run.xlsx", {"a": [["hello"]]}))
 
 
 def write_parquet(folder, columns, fields=None):

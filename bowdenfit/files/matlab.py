@@ -88,10 +88,10 @@ def _name_field(owner: str, key: str, label: str) -> str:
 
     The field Data of a structure X next to Y has the times of Y, as ControlDesk of dSPACE writes them.
     """
-    group, _, own = owner.rpartition(".")
-    if key not in _VALUES or not (label or own == "X"):
+    group, _, axis = owner.rpartition(".")
+    if key not in _VALUES or not (label or axis == "X"):
         return f"{owner}.{key}"
-    name = "time" if own == "X" else label.replace(".", "_")
+    name = "time" if axis == "X" else label.replace(".", "_")
     return f"{group}.{name}" if group else name
 
 

@@ -238,13 +238,13 @@ def _with_constant_angles(data: Any, cable: Cable, error: BenchError) -> Any:
     angles = find_row_angles(data)
     if angles is None:
         return data
-    own, is_own = np.array(angles.own, dtype=float), np.array(angles.is_own)
+    own_angles, is_own = np.array(angles.own, dtype=float), np.array(angles.is_own)
     for k, contact in enumerate(cable.description.contact):
         constant = contact.wrap_angle.constant
         if constant is not None and constant.sd is None:
-            own[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
+            own_angles[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
             is_own[..., k] = True
-    return replace(data, angles=replace(angles, own=own, is_own=is_own))
+    return replace(data, angles=replace(angles, own=own_angles, is_own=is_own))
 
 
 def _widened(readings: Interval, shifts: list[float]) -> Interval:

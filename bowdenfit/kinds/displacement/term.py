@@ -198,8 +198,8 @@ class DisplacementTerm:
             known = Turn(*(jnp.concatenate(part) for part in parts))
         travel, at = data.displacement + beside - zero[data.run], tendon(data.run)
         sliding = at.sliding(travel, data.stroke)[0]
-        since = at.sliding_after_turn(_select_turns(known, data.after), travel, data.stroke)[0]
-        return LoadCells.of(values).shown_input(jnp.where(data.slides, sliding, since))
+        after_turn = at.sliding_after_turn(_select_turns(known, data.after), travel, data.stroke)[0]
+        return LoadCells.of(values).shown_input(jnp.where(data.slides, sliding, after_turn))
 
     def _linearize(self, values: Values, data: DisplacementData, weights: Values) -> "_Linearization":
         exponent, angle_variance = self.exponents(values, data)

@@ -367,8 +367,8 @@ class LoopRecordingsTerm(BlocksTerm):
         """That with which the loop is as wide as the recording's own; none where that is not known."""
         least = _LEAST_PRELOAD * self.cable.friction.conditions.load.value
         by_loss = data.loss / (2 * jnp.maximum(drive.preload, least))
-        own = jnp.where(data.tells_loss, jnp.minimum(by_loss, _LARGEST_EXPONENT), data.exponent)
-        guess = jnp.where(data.tells_loss | data.tells_exponent, own - drive.exponent, 0.0)
+        exponent = jnp.where(data.tells_loss, jnp.minimum(by_loss, _LARGEST_EXPONENT), data.exponent)
+        guess = jnp.where(data.tells_loss | data.tells_exponent, exponent - drive.exponent, 0.0)
         return guess, _LOOP_REACH * (drive.exponent + guess)
 
     def _mean_lost_force(

@@ -73,11 +73,11 @@ def describe_wrong_delay(fit: Record) -> str:
     if abs(error) <= _LARGEST_DELAY_ERROR * block:
         return ""
     estimated = 1000 * float(np.median([recording.account.delay for recording in recordings.items]))
-    stated = f"{estimated + error:.1f}"
+    total = f"{estimated + error:.1f}"
     return (
-        f"The output channel was shifted by {estimated:.0f} ms, as its reversals say, but the fit finds {stated} ms, and so "
+        f"The output channel was shifted by {estimated:.0f} ms, as its reversals say, but the fit finds {total} ms, and so "
         f"large an error cannot be corrected within blocks of {block:.0f} ms; the usual cause is friction that rises toward "
-        f"standstill. Fit again with --set 'tables.recordings.prepare.delay={{value={stated},unit=\"ms\"}}' (in cable.toml "
+        f"standstill. Fit again with --set 'tables.recordings.prepare.delay={{value={total},unit=\"ms\"}}' (in cable.toml "
         "delay under prepare)."
     )
 

@@ -10,7 +10,7 @@ References:
     Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), equation 4.17, for the process.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 
 import jax.numpy as jnp
@@ -22,6 +22,16 @@ DEPARTURE_SHARES: Mapping[int, float] = MappingProxyType({2: 0.7, 3: 0.3})
 SMOOTH_SHARES: Mapping[int, float] = MappingProxyType({1: 0.26, 2: 0.115, 3: 0.048, 4: 0.021, 5: 0.009})
 """Share of the process's whole variance of the polynomial of each degree; that of the constant is the rest."""
 
+_LEGENDRE: Mapping[int, Callable[[Array], Array]] = MappingProxyType(
+    {
+        1: lambda z: z,
+        2: lambda z: (3 * z**2 - 1) / 2,
+        3: lambda z: (5 * z**3 - 3 * z) / 2,
+        4: lambda z: (35 * z**4 - 30 * z**2 + 3) / 8,
+        5: lambda z: (63 * z**5 - 70 * z**3 + 15 * z) / 8,
+    }
+)
+
 
 def smooth_functions(z: Float[Array, " rows"], degrees: Collection[int]) -> Float[Array, "rows functions"]:
     """Legendre polynomials with a mean square of 1 over the range at z, -1 to 1 there; outside as at its nearer end.
@@ -31,11 +41,4 @@ def smooth_functions(z: Float[Array, " rows"], degrees: Collection[int]) -> Floa
         degrees: Degrees of the polynomials, 1 to 5.
     """
     z = jnp.clip(z, -1.0, 1.0)
-    polynomials = {
-        1: z,
-        2: (3 * z**2 - 1) / 2,
-        3: (5 * z**3 - 3 * z) / 2,
-        4: (35 * z**4 - 30 * z**2 + 3) / 8,
-        5: (63 * z**5 - 70 * z**3 + 15 * z) / 8,
-    }
-    return jnp.stack([jnp.sqrt(2 * degree + 1.0) * polynomials[degree] for degree in degrees], axis=-1)
+    return jnp.stack([jnp.sqrt(2 * degree + 1.0) * _LEGENDRE[degree](z) for degree in degrees], axis=-1)

@@ -179,9 +179,10 @@ class Conditional:
             values = others | {p.name: coefficients[i] for i, p in enumerate(own.free)}
             return jnp.concatenate(list(self.posterior.residuals_at(values, data).values()))
 
-        slopes = jax.jacfwd(residuals)(middle)
+        differentiate = partial(jax.jvp, residuals, (middle,))
+        residual, slopes = jax.vmap(lambda way: differentiate((way,)), out_axes=(None, 1))(jnp.eye(own.size))
         root = jnp.linalg.cholesky(slopes.T @ slopes + jnp.diag(width**2))
-        center = middle - cho_solve((root, True), slopes.T @ residuals(middle))
+        center = middle - cho_solve((root, True), slopes.T @ residual)
         finite = jnp.all(jnp.isfinite(root)) & jnp.all(jnp.isfinite(center))
         return _Ridge(jnp.where(finite, center, middle), jnp.where(finite, root, jnp.diag(width)))
 

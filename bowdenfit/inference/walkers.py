@@ -79,7 +79,7 @@ def make_walker_sweep(
     proposals = [move for move, _ in moves]
 
     def sweep(choices: SweepChoices, z: Array, data: Any) -> tuple[Array, Array, Array]:
-        def evaluate(points: Array, is_z: bool) -> Walkers:
+        def evaluate(points: Array, is_z: Array) -> Walkers:
             ways = [partial(_apply_map, frame, is_z) for frame, _ in frames]
             w, z, volume = jax.lax.switch(choices.frame, ways, points, data)
             value = jax.vmap(lambda one: log_density(one, data))(z)
@@ -89,27 +89,31 @@ def make_walker_sweep(
             value_in_w = jnp.where(finite, value + jnp.where(finite, volume, 0.0), beyond)
             return Walkers(w, z, value_in_w, value, jnp.zeros_like(value))
 
-        def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, RandomNumbers]) -> Any:
-            (moving, resting), (kind, chance, numbers) = halves, turn
+        def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, Array, RandomNumbers]) -> Any:
+            (moving, resting), (begins, kind, chance, numbers) = halves, turn
             w, factors = jax.lax.switch(kind, proposals, numbers, moving.w, resting.w)
-            proposed = evaluate(w, is_z=False)._replace(accepted=moving.accepted + 1)
+            proposed = evaluate(jnp.where(begins, moving.z, w), begins)._replace(accepted=moving.accepted + ~begins)
             better = factors + proposed.value_in_w - moving.value_in_w > jnp.log(chance)
-            moved = jax.tree.map(lambda new, old: jax.vmap(jnp.where)(better, new, old), proposed, moving)
+            moved = jax.tree.map(lambda new, old: jax.vmap(jnp.where)(begins | better, new, old), proposed, moving)
             return (resting, moved), None
 
-        begin, half = evaluate(z, is_z=True), len(z) // 2
-        halves = jax.tree.map(lambda rows: rows[:half], begin), jax.tree.map(lambda rows: rows[half:], begin)
-        uniform = to_uniform(choices.bits).reshape(-1, *choices.bits.shape[2:])
-        turns = jnp.repeat(choices.kinds, 2), uniform[..., 0], random_numbers(uniform[..., 1:])
+        # In two turns before the first step each half is evaluated where it is, so that only one evaluation is compiled.
+        half = len(z) // 2
+        halves = tuple(Walkers(rows, rows, *jnp.zeros((3, half))) for rows in (z[:half], z[half:]))
+        bits = choices.bits.reshape(-1, *choices.bits.shape[2:])
+        uniform = to_uniform(jnp.concatenate([jnp.zeros_like(bits[:2]), bits]))
+        kinds = jnp.concatenate([jnp.zeros(2, choices.kinds.dtype), jnp.repeat(choices.kinds, 2)])
+        begins = jnp.arange(len(kinds)) < 2
+        turns = begins, kinds, uniform[..., 0], random_numbers(uniform[..., 1:])
         ended = jax.tree.map(lambda *rows: jnp.concatenate(rows), *jax.lax.scan(half_step, halves, turns)[0])
         return ended.z, ended.value, ended.accepted
 
     return sweep
 
 
-def _apply_map(frame: CoordinateMap, is_z: bool, points: Array, data: Any) -> tuple[Array, Array, Array]:
+def _apply_map(frame: CoordinateMap, is_z: Array, points: Array, data: Any) -> tuple[Array, Array, Array]:
     """Return w, z and the log volume of walkers, given either of the first two."""
-    return frame(points, jnp.asarray(is_z), data)
+    return frame(points, is_z, data)
 
 
 def to_uniform(bits: Array | np.ndarray) -> Array:

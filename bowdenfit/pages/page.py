@@ -8,7 +8,6 @@ import struct
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -18,7 +17,7 @@ from markupsafe import Markup
 from bowdenfit.pages.section import HtmlPage, PageSection, Picture
 from bowdenfit.words import printable, unbroken
 
-MOST_BYTES = 1_450_000  # of a page, so that it can be mailed; a judgement
+MOST_BYTES = 3_000_000  # of a page, so that it can be mailed; a judgement
 TOO_LARGE = "<p>This figure would make the page too large; it is in the folder of figures.</p>"
 _PNG = b"\x89PNG\r\n\x1a\n"  # its first bytes; width and height follow in the first block
 _CSS_PIXELS = 0.6  # of a page for one of a figure: 96 in an inch for 160
@@ -28,16 +27,13 @@ _HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
 _STYLES = (_HERE / "page.css", _HERE / "uplot" / "uPlot.min.css")  # the second of charts alone
 
 
-def render_page(
-    page: HtmlPage, drawings: Mapping[str, bytes], narrow: Mapping[str, bytes] = MappingProxyType({})
-) -> str:
+def render_page(page: HtmlPage, drawings: Mapping[str, bytes]) -> str:
     """A page as HTML.
 
     Args:
         page: Contents of the page.
         drawings: Its figures as PNG, by name; a figure without one is left out, and one for which there is no room is said to
             be.
-        narrow: Drawings that are shown instead on a phone, by name, as far as there is room.
 
     Raises:
         ValueError: A drawing is no PNG.
@@ -49,10 +45,6 @@ def render_page(
         image = "" if picture.alone else _image_tag(drawings[picture.name], picture.title)
         room -= len(image)
         pieces[2 * i + 1] = image if room > 0 else TOO_LARGE
-        if room > 0 and picture.name in narrow and len(phone := _image_source(narrow[picture.name])) < room:
-            room -= len(phone)
-            source = f'<source media="(max-width: 40rem)" srcset="{phone}">'
-            pieces[2 * i + 1] = f'<picture class="fits">{source}{image}</picture>'
     return "".join(pieces)
 
 
@@ -100,12 +92,9 @@ def _image_tag(png: bytes, title: str) -> str:
         raise ValueError("a figure is damaged: its file is no PNG")
     width, height = (round(pixels * _CSS_PIXELS) for pixels in struct.unpack_from(">2I", png, len(_PNG) + 8))
     kind = "wide" if width > _COLUMN else "narrow"
-    alt = escape(printable(title))
-    return f'<img class="{kind}" width="{width}" height="{height}" alt="{alt}" src="{_image_source(png)}">'
+    alt, content = escape(printable(title)), base64.b64encode(png).decode()
+    return f'<img class="{kind}" width="{width}" height="{height}" alt="{alt}" src="data:image/png;base64,{content}">'
 
-
-def _image_source(png: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
 
 def _assemble(page: HtmlPage) -> str:

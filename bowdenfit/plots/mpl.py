@@ -1,4 +1,4 @@
-"""The names of matplotlib and Pillow that figures use; loaded when something is drawn, by `bowdenfit.plots`."""
+"""The names of matplotlib that figures use; loaded when something is drawn, by `bowdenfit.plots`."""
 
 from matplotlib import colormaps as colormaps
 from matplotlib import rc_context as rc_context
@@ -17,4 +17,3 @@ from matplotlib.ticker import LogLocator as LogLocator
 from matplotlib.ticker import MaxNLocator as MaxNLocator
 from matplotlib.ticker import NullFormatter as NullFormatter
 from matplotlib.transforms import ScaledTranslation as ScaledTranslation
-from PIL import Image as Image

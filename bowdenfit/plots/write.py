@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -47,21 +46,11 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
         ending: Format.
     """
     options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
-    buffer: Path | BinaryIO = BytesIO() if ending == PNG else target
     try:
-        figure.savefig(buffer, **options)
+        figure.savefig(target, **options)
     except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
         _show_as_written(figure)
-        figure.savefig(buffer, **options)
-    if isinstance(buffer, BytesIO):
-        _save_in_few_colors(buffer, target)
-
-
-def _save_in_few_colors(png: BytesIO, target: Path | BinaryIO) -> None:
-    """Save a picture with a palette of 256 colors, which look the same here and take a third of the bytes."""
-    with plots.mpl.Image.open(png) as picture:
-        few = picture.convert("RGB").quantize(256, dither=plots.mpl.Image.Dither.NONE)
-    few.save(target, PNG, optimize=True, dpi=(DOTS_PER_INCH, DOTS_PER_INCH))
+        figure.savefig(target, **options)
 
 
 def _show_as_written(figure: Figure) -> None:

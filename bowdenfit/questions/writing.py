@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.display import Display, Rows
@@ -118,19 +117,16 @@ def write_answer(
     return files
 
 
-def write_page(
-    page: "HtmlPage", figures_folder: Path, path: Path, narrow: "Mapping[str, bytes]" = MappingProxyType({})
-) -> Path:
+def write_page(page: "HtmlPage", figures_folder: Path, path: Path) -> Path:
     """Write a page whole, with the figures that lie in a folder; loads no model.
 
     Args:
         page: The page.
         figures_folder: Where its figures are, as PNG.
         path: The file.
-        narrow: Narrow drawings for phones as PNG, by figure; those that are missing are shown as they are.
     """
     from bowdenfit.pages.page import render_page
     files = {picture.name: kept_file(figures_folder, f"{picture.name}.png") for picture in page.pictures}
     drawings = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
-    write_text(path, render_page(page, drawings, narrow))
+    write_text(path, render_page(page, drawings))
     return path

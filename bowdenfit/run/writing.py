@@ -1,7 +1,6 @@
 """Write the results folder of a finished fit: the fit itself and its texts, and then figures and the report."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -14,7 +13,7 @@ from bowdenfit.outputs import write_text
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
 from bowdenfit.questions.figures import collect_figure_data, titles_and_captions, warning_mark, write_figure_files
-from bowdenfit.questions.report.page import draw_for_phones, report_page
+from bowdenfit.questions.report.page import report_page
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import assess_fit
@@ -89,8 +88,7 @@ def draw_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
         failed.attempt(name, write_figure_files, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
     announce_stage("writing the report")
     drawn_figures = {name: shown for name, shown in data.items() if name not in failed}
-    report, narrow = partial(report_page, fit, data), partial(draw_for_phones, drawn_figures, mark)
-    failed.attempt(REPORT, lambda: write_page(report(), folder / FIGURES, folder / REPORT, narrow()))
+    failed.attempt(REPORT, lambda: write_page(report_page(fit, data), folder / FIGURES, folder / REPORT))
     if data:
         captions, is_complete = titles_and_captions(drawn_figures, fit.name, mark), len(drawn_figures) == len(data)
         failed.attempt("captions", _write_captions, folder, captions, is_complete)

@@ -48,7 +48,6 @@ from bowdenfit.results.store import load
 
 ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, budget_section, bends_section)
 BELOW_FIGURES = (methods_section, provenance_section)
-_PHONE = 3.0  # in, so that panels stand one below the other and letters can be read
 FIGURES_TITLE = "Figures"
 FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
@@ -132,8 +131,7 @@ def write_report(
     with guard, file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:
         for name, data in figures.items():
             write_figure_files(name, data, Path(figures_folder), (PNG,), fit.name, mark=mark)
-        narrow = draw_for_phones(figures, mark)
-        write_page(report_page(fit, figures, ranking, changes), Path(figures_folder), temporary, narrow)
+        write_page(report_page(fit, figures, ranking, changes), Path(figures_folder), temporary)
     return path
 
 
@@ -141,18 +139,3 @@ def _load_earlier(earlier: Record | str | Path) -> tuple[Record, str]:
     """Return an earlier fit and its name."""
     return (load(Path(earlier)), str(earlier)) if isinstance(earlier, str | Path) else (earlier, earlier.name)
 
-
-def draw_for_phones(figures: dict[str, Any], mark: str) -> dict[str, bytes]:
-    """Return narrow drawings, of panels one below the other, of the figures that a report shows without charts.
-
-    Args:
-        figures: Data by name.
-        mark: See `warning_mark`.
-    """
-    with TemporaryDirectory() as folder:
-        names = [name for name in figures if name not in FOLDED and name not in CHARTS]
-        files = {
-            name: write_figure_files(name, figures[name], Path(folder), (PNG,), "", _PHONE, mark)
-            for name in names
-        }
-        return {name: file.read_bytes() for name, (file, *_) in files.items()}

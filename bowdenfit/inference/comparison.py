@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from scipy.optimize import minimize
 
 from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
 
@@ -136,6 +135,8 @@ def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, floa
         Yao, Vehtari, Simpson and Gelman 2018, "Using stacking to average Bayesian predictive distributions" (Bayesian
         Analysis 13), equation 5.
     """
+    from scipy.optimize import minimize  # here, because a fit, which stacks nothing, must not wait for it
+
     elpd = np.column_stack([p.elpd for p in predictions.values()])
     density = np.exp(elpd - elpd.max(axis=1, keepdims=True))
     n = len(predictions)

@@ -20,7 +20,6 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.coordinates import maps_without_ridge
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import run_in_batches
-from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.importance import Densities, compile_densities
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
@@ -191,7 +190,9 @@ class LooRefits:
         data, programs = density.data_without(reading), density.programs
         if isinstance(programs, Densities):
             return importance.sample(request, replace(programs, data=data))
-        return sample(request, programs, data)
+        from bowdenfit.inference import ensemble  # here, because emcee takes half a second to load
+
+        return ensemble.sample(request, programs, data)
 
 
 def leave_one_out(

@@ -19,7 +19,6 @@ from jax import Array
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
-from scipy.stats import rankdata
 
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.kinds.candidate import Candidate
@@ -152,6 +151,8 @@ def _build_polynomials(reading: np.ndarray) -> np.ndarray:
 
 def _compute_normal_scores(column: np.ndarray) -> np.ndarray:
     """Return the column brought to a normal distribution by its ranks, so that no far value rules a polynomial."""
+    from scipy.stats import rankdata  # here, because a fit, whose report can rank, must not wait for it
+
     return np.asarray(ndtri((rankdata(column) - 0.5) / len(column)))
 
 

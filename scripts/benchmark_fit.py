@@ -4,7 +4,7 @@
 
 Run it with the Python of the environment that bowdenfit and its tests use, on a machine that does nothing else: it takes
 several minutes, measures everything in one go, and prints one table. Every number is the median of N fresh processes
-(default 3). `--only` measures some of it: rows by their names, "plain" (other samplers), "many" (many cables), "counts".
+(default 3). `--only` measures some of it: rows by their names, "plain" (plain programs), "many" (many cables), "counts".
 `--record` replaces the tables of docs/benchmarks.md, with the machine, the date and the commit.
 
 Whole processes: wall time from start to exit, imports, compilation, figures and files included; the time that processors
@@ -20,12 +20,12 @@ the one that their own checkout wrote.
 "calibrate, 200": 200 replications of the on-body data. Of the other checkout as few are run as are needed for the time of
 one more (FEW), and the rest is reckoned as if each took as long. "1000 cables": scripts/benchmark_batch.py says of what.
 
-To 1000 effective draws (bulk, the worst of all 11 parameters) of the joint posterior of the on-body data, by the programs
-in scripts/baselines, which draw and write nothing: from the start of the process to the first look at the draws that finds
-as many. bowdenfit, as a library, samples on until R-hat, the tails, l* and eta* are settled
-too, while the plain programs stop at 1000. Their pairs are with bowdenfit's own run of the same turn, so that a ratio below
-1 means that bowdenfit is quicker. Means of the friction coefficients must agree, or a warning is printed. "cold fit beside"
-compares the whole command, with figures and files, to a plain program that only draws.
+"until the answer" is the time from the start of a process to the first thing that it prints. Beside plain programs stand a
+cold fit and one with the cache filled, until the answer and until all figures and files are written, and least squares
+alone. The plain programs draw and write nothing, and wait for all they do: scripts/baselines/plain_blackjax.py samples the
+posterior of the on-body data without departures, four chains with 1000 draws of warm-up and 1000 to keep, and
+scripts/baselines/plain_lmfit.py fits them by least squares, without intervals. `--baseline` runs another program in place of
+the first, such as "folder/nuts.py 1000 1000 dense".
 
 Below the table: stages of the cold fits as fit.json keeps them; how many programs one fit compiles, and how many times it
 works out each answer, which should be once (scripts/baselines/counted.py, in one process).
@@ -36,8 +36,9 @@ The exit code is 0 whenever everything could be measured, whether or not the tar
 import argparse
 import json
 import os
+import shlex
 import tempfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -48,11 +49,10 @@ from processes import BASELINES, ROOT, Run, byte_code, measured, search_path, ty
 
 DATASET = "datasets/on-body-exoskeleton"
 LOOP = "datasets/synthetic-haptic-loop"  # stretch, preload and loop in one posterior
-COEFFICIENTS = ("mu1", "mu2", "mu3")
 BENCH, RECORDINGS = "datasets/synthetic-bench", "datasets/synthetic-recordings"
 FITS: dict[str, tuple[str, ...]] = {  # arguments of a cold fit, by its name in the table
     "fit": (DATASET,),
-    "fit --no-mcmc": (DATASET, "--no-mcmc"),
+    "fit --no-mcmc": (DATASET, "--no-mcmc", "--no-figures"),
     "fit, haptic loop": (LOOP,),
     "fit, recordings": (RECORDINGS,),
     "fit, bench": (BENCH,),
@@ -71,14 +71,20 @@ READS: dict[str, tuple[str, ...]] = {  # FIT stands for a finished fit of the on
 FILLED = "fit, cache filled"
 GROUPS = ("plain", "library", "many", "counts")
 NOT_PAIRED = ("plot one", "plot one anew")  # older commands draw all figures
-PLAIN = {"blackjax": "plain_blackjax.py", "emcee and NumPy": "plain_emcee.py", "NumPyro": "plain_numpyro.py"}
+COLD, LEAST_SQUARES = "fit", "fit --no-mcmc"
+PLAIN = {COLD: "blackjax", FILLED: "blackjax", LEAST_SQUARES: "lmfit"}  # program beside which a row stands
+PROGRAMS = {"blackjax": ["plain_blackjax.py", "1"], "lmfit": ["plain_lmfit.py"]}
+ANSWER = ", until the answer"
 CALIBRATE, MANY, FEW = "calibrate, 200", 200, (10, 60)
 CABLES = "1000 cables"
 LIBRARY = "library beside command"
 TARGETS = {  # ratios
-    "cold fit beside blackjax": 0.9,
-    "fit, cache filled beside blackjax": 0.6,
-    LIBRARY: 1.15,
+    f"{COLD}{ANSWER}, beside blackjax": 1.0,
+    f"{COLD} beside blackjax": 1.3,
+    f"{FILLED}{ANSWER}, beside blackjax": 0.6,
+    f"{FILLED} beside blackjax": 0.9,
+    f"{LEAST_SQUARES} beside lmfit": 1.5,
+    LIBRARY: 1.1,
 }
 SECONDS = {
     "summary": 0.5,
@@ -96,18 +102,7 @@ HEAD = """# Benchmarks
 The last run of each table, newest first. `scripts/benchmark_fit.py --record` writes the first ones; its head explains them.
 """
 BY_HAND = "## On a GPU"  # begins what is kept, because this script does not measure it
-AGREEMENT = 0.2  # standard deviations between means
-LIBRARIES = ("jax", "emcee", "blackjax", "numpyro", "numpy")
-
-
-@dataclass(frozen=True)
-class Sampler:
-    """What one program needed for its effective draws, and what they say of the friction coefficients."""
-
-    to_target: float
-    ess: float
-    mean: np.ndarray
-    sd: np.ndarray
+LIBRARIES = ("jax", "emcee", "blackjax", "lmfit", "numpy")
 
 
 @dataclass(frozen=True)
@@ -156,6 +151,7 @@ class Bench:
     repeats: int
     other: Path | None
     only: Collection[str]
+    programs: Mapping[str, Sequence[str]]
 
     def is_requested(self, name: str) -> bool:
         """Whether a row or a group of them is to be measured."""
@@ -253,28 +249,19 @@ class Bench:
         return self.folder / f"finished_{self.trees.index(tree)}"
 
 
-def samplers(folder: Path, repeats: int) -> dict[str, list[Sampler]]:
-    """Time to 1000 effective draws of bowdenfit and of the plain programs, in turns."""
-    results: dict[str, list[Sampler]] = {}
-    for seed in range(1, repeats + 1):
-        for name, script in {"bowdenfit": "with_bowdenfit.py", **PLAIN}.items():
-            say(f"{name} to 1000, {seed} of {repeats}")
-            environment = {"PYTHONPATH": search_path(), "XDG_CACHE_HOME": str(folder / f"cache_{name}_{seed}")}
-            run = measured([str(BASELINES / script), str(seed)], environment, watched=False)
-            page = json.loads(run.output)
-            sampler = Sampler(page["ready_at"] - run.started, page["ess"], np.array(page["mean"]), np.array(page["sd"]))
-            results.setdefault(name, []).append(sampler)
-    return results
-
-
-def beside_plain(results: dict[str, list[Sampler]], fits: Sequence[Row]) -> Iterator[Row]:
-    """Bowdenfit beside the plain programs: to 1000 effective draws, and whole fits, cold and with the cache filled."""
-    runs = {name: [Run(0.0, s.to_target, 0.0, "") for s in item] for name, item in results.items()}
-    for name in PLAIN:
-        yield Row(f"to 1000, beside {name}", runs["bowdenfit"], runs[name])
-    for row in fits:
-        for name in PLAIN:
-            yield Row(f"{'cold fit' if row.name == 'fit' else row.name} beside {name}", row.runs, runs[name])
+def beside_plain(rows: Sequence[Row], programs: Mapping[str, Sequence[str]], repeats: int) -> Iterator[Row]:
+    """Whole fits, and the same until the answer, beside plain programs, which run as often."""
+    fits = {row.name: row.runs for row in rows if row.name in PLAIN}
+    times = dict[str, list[Run]]()
+    for name in dict.fromkeys(PLAIN[fit] for fit in fits):
+        for i in range(repeats):
+            say(f"{name}, {i + 1} of {repeats}")
+            times.setdefault(name, []).append(measured(programs[name], {"JAX_PLATFORMS": "cpu"}, watched=False))
+    for fit, runs in fits.items():
+        program = PLAIN[fit]
+        answers = [replace(run, seconds=run.answered, cpu=0.0, memory=0.0) for run in runs]
+        yield Row(f"{fit}{ANSWER}, beside {program}", answers, times[program])
+        yield Row(f"{fit} beside {program}", runs, times[program])
 
 
 def stage_rows(rows: Sequence[Row]) -> Table:
@@ -297,16 +284,6 @@ def counts() -> Iterator[str]:
         page = json.loads(run.output)
         answers = ", ".join(f"{request.split('.', 2)[-1]} {times}" for request, times in page["answers"].items())
         yield f"{name}: {page['programs']} programs compiled; answers worked out: {answers}."
-
-
-def disagreements(results: dict[str, list[Sampler]]) -> Iterator[str]:
-    """Means that differ, which would make this a comparison of unequal things."""
-    first = results["bowdenfit"]
-    for other in PLAIN:
-        ours, theirs = (np.mean([s.mean for s in item], axis=0) for item in (first, results[other]))
-        for name, distance in zip(COEFFICIENTS, np.abs(theirs - ours) / first[0].sd, strict=True):
-            if not distance < AGREEMENT:
-                yield f"Warning: the means of {name} by bowdenfit and by {other} are {distance:.2f} sd apart."
 
 
 def markdown(rows: Table) -> str:
@@ -334,11 +311,15 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", default=(), choices=names, metavar="NAME", help="rows, or plain, many, counts [default: all]"
     )
+    parser.add_argument("--baseline", metavar="PROGRAM", help="plain sampler and its arguments [default: plain_blackjax.py 1]")
     options = parser.parse_args()
     other = options.against and options.against.resolve()
+    programs = {name: [str(ROOT / BASELINES / script), *arguments] for name, (script, *arguments) in PROGRAMS.items()}
+    if options.baseline:
+        programs["blackjax"] = shlex.split(options.baseline)
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(byte_code(Path(folder)))
-        rows, remarks = measurements(Bench(Path(folder), max(options.repeats, 1), other, options.only))
+        rows, remarks = measurements(Bench(Path(folder), max(options.repeats, 1), other, options.only, programs))
         stages = stage_rows(rows)
     table = [COLUMNS, *(row.cells() for row in rows)]
     for item in filter(None, (table, stages)):
@@ -355,9 +336,7 @@ def measurements(bench: Bench) -> tuple[list[Row], list[str]]:
     """All rows that are asked for, and what is to be said besides."""
     rows, remarks = list(bench.rows()), list[str]()
     if bench.is_requested("plain"):
-        computed = samplers(bench.folder, bench.repeats)
-        rows += beside_plain(computed, [row for row in rows if row.name in {"fit", FILLED}])
-        remarks += disagreements(computed)
+        rows += beside_plain(rows, bench.programs, bench.repeats)
     if bench.is_requested("library"):
         rows.append(bench.library())
     if bench.is_requested("many"):

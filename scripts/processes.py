@@ -24,6 +24,7 @@ class Run:
         memory: 0 where it was not watched.
         cpu: Seconds that it and those it started have computed.
         load: How many processes wanted to compute on this machine in the minute before it ended.
+        answered: Seconds until it printed something.
     """
 
     started: float
@@ -33,6 +34,7 @@ class Run:
     results: Path | None = None
     cpu: float = 0.0
     load: float = 0.0
+    answered: float = 0.0
 
     @property
     def stages(self) -> dict[str, float]:
@@ -63,28 +65,29 @@ def measured(
         tree: The checkout that it starts in.
         watched: Whether its memory is watched, which takes a core 4 ms for each of its processes, twenty times a second.
     """
-    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+    with tempfile.TemporaryFile() as errors:
         started = time.monotonic()
         process = subprocess.Popen(
-            [sys.executable, *arguments], cwd=tree, env={**os.environ, **environment}, stdout=output, stderr=errors
+            [sys.executable, *arguments], cwd=tree, env={**os.environ, **environment}, stdout=subprocess.PIPE, stderr=errors
         )
         watch = MemoryWatch(process.pid) if watched else None
+        assert process.stdout is not None
+        output = process.stdout.read(1)
+        answered = time.monotonic() - started
+        output += process.stdout.read()
         _, status, usage = os.wait4(process.pid, 0)
         seconds = time.monotonic() - started
         process.returncode = os.waitstatus_to_exitcode(status)
         kernel = usage.ru_maxrss / (1024**2 if sys.platform == "darwin" else 1024)
         memory = watch.stop() or kernel if watch is not None else 0.0
-        written = [_read(file) for file in (output, errors)]
+        errors.seek(0)
+        written = [output.decode(), errors.read().decode()]
     if process.returncode == NOT_TRUSTED and results is not None:
         print("Warning: a fit did not converge; its times mean little.", file=sys.stderr)
     elif process.returncode:
         sys.exit(f"{' '.join(arguments)} ended with exit code {process.returncode}:\n{written[1]}")
-    return Run(started, seconds, memory, written[0], results, usage.ru_utime + usage.ru_stime, os.getloadavg()[0])
-
-
-def _read(file) -> str:
-    file.seek(0)
-    return file.read().decode()
+    cpu = usage.ru_utime + usage.ru_stime
+    return Run(started, seconds, memory, written[0], results, cpu, os.getloadavg()[0], answered)
 
 
 class MemoryWatch:

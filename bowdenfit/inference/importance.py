@@ -15,7 +15,7 @@ References:
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,6 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.inference.batch.weights import diagnose_weighted, effective_sample_size, even_weights, resample
 from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, worst_diagnostics
 from bowdenfit.inference.compilation import compile_program
@@ -40,7 +41,9 @@ _MOST_ROUNDS = 20  # of learning; ropes with five and nine parameters took 7 and
 _LEAST_EFFICIENCY = 0.1  # effective draws per draw below which more of them would not help
 _USUAL = 12_000  # densities that sampling usually takes in all, for the progress bar
 _LEAST_PER_PARAMETER = 10  # effective draws per parameter to which weights are evened out, so that a mixture can be fitted
-_PARTS, _WIDE, _WIDE_SHARE = 2, 2.0, 0.1  # components of the mixture, and the factor and weight of a wide one
+_PARTS, _WIDE, _WIDE_SHARE = 4, 2.0, 0.1  # components of the mixture, and the factor and weight of a wide one
+# Degrees of freedom: those of the mean of four mountings. With five, effective draws of mu fell the more were drawn.
+_FREEDOM = 3
 _STREAM = 4
 
 
@@ -83,13 +86,17 @@ def compile_densities(log_density: Callable[[Array, Any], Array], data: Any, siz
 def learn_proposal(densities: Densities, request: SamplingRequest) -> StudentMixture:
     """Return a mixture near the posterior, learnt from weighted draws of mixtures before it.
 
+    With few mountings everything spreads wider the more mountings scatter, so components begin at different scatters.
+
     Args:
         densities: The log density.
         request: Start and seed.
     """
     start, generator = request.start, np.random.default_rng([request.seed, _STREAM])
+    names = [parameter.name for parameter in request.posterior.model.space.free]
+    scatter = names.index(RUN_SCATTER) if RUN_SCATTER in names else 0
     least = _LEAST_PER_PARAMETER * len(start.z)
-    mixtures = [StudentMixture(start.z[None], np.linalg.cholesky(start.covariance)[None], np.ones(1))]
+    mixtures = [StudentMixture(start.z[None], np.linalg.cholesky(start.covariance)[None], np.ones(1), _FREEDOM)]
     z, value = np.empty((0, len(start.z))), np.empty(0)
     begin = time.monotonic()
     for _ in range(_MOST_ROUNDS):
@@ -102,7 +109,9 @@ def learn_proposal(densities: Densities, request: SamplingRequest) -> StudentMix
             mixtures.append(mixtures[-1])
             continue
         rows = z[resample(np.exp(even_weights(log_weights, least)), 4 * _DRAWS, 0.5)]
-        mixtures.append(start_mixture(rows, _PARTS).refine(rows).with_wide_component(rows, _WIDE, _WIDE_SHARE))
+        rows = rows[np.argsort(rows[:, scatter])]
+        mixture = start_mixture(rows, _PARTS, _FREEDOM).refine(rows)
+        mixtures.append(mixture.with_wide_component(rows, _WIDE, _WIDE_SHARE))
         if effective_sample_size(log_weights) >= _ENOUGH:
             break
     return mixtures[-1]
@@ -119,48 +128,61 @@ def sample(request: SamplingRequest, densities: Densities) -> Chain:
         densities: The log density.
     """
     proposal, n_batches, size = learn_proposal(densities, request), request.settings.n_ensembles, len(request.start.z)
-    generator = np.random.default_rng([request.seed, 0])
-    z, log_ratio = np.empty((n_batches, 0, size)), np.empty((n_batches, 0))
+    names, generator = [p.name for p in request.posterior.model.space.free], np.random.default_rng([request.seed, 0])
+    log_ratio, z = np.empty((n_batches, 0)), np.empty((n_batches, 0, size))
+    derived = dict[str, np.ndarray]()
     while True:
         proposed = generator.permutation(proposal.draw(generator, n_batches * _DRAWS))
-        ratios = densities(proposed) - proposal.log_density(proposed)
+        ratios = (densities(proposed) - proposal.log_density(proposed)).reshape(n_batches, _DRAWS)
+        more = {name: np.reshape(values, ratios.shape) for name, values in request.quantities(proposed).items()}
+        log_ratio = np.concatenate([log_ratio, ratios], axis=1)
         z = np.concatenate([z, proposed.reshape(n_batches, _DRAWS, size)], axis=1)
-        log_ratio = np.concatenate([log_ratio, ratios.reshape(n_batches, _DRAWS)], axis=1)
-        chain = _make_chain(request, z, log_ratio)
+        derived = {name: np.concatenate([derived.get(name, values[:, :0]), values], axis=1) for name, values in more.items()}
+        chain = _make_chain(request, z, {name: z[..., i] for i, name in enumerate(names)}, derived, log_ratio)
         request.report(Progress(log_ratio.size, request.settings.max_steps, *worst_diagnostics(chain), "importance"))
         if not chain.reasons or chain.acceptance < _LEAST_EFFICIENCY or chain.steps + _DRAWS > request.settings.max_steps:
             return chain
 
 
-def _make_chain(request: SamplingRequest, z: np.ndarray, log_ratio: np.ndarray) -> Chain:
+def _make_chain(
+    request: SamplingRequest,
+    z: np.ndarray,
+    parameters: Mapping[str, np.ndarray],
+    derived: Mapping[str, np.ndarray],
+    log_ratio: np.ndarray,
+) -> Chain:
     """Return draws of equal weight, with diagnostics of the weighted ones.
 
     Args:
+        request: Settings and seed.
         z: All draws, (batch, draw, parameter).
+        parameters, derived: The same by name, and derived quantities, (batch, draw).
         log_ratio: Log density less that of the proposal, (batch, draw).
     """
     settings, (n_batches, n_draws) = request.settings, log_ratio.shape
     smoothed, pareto_k = smooth_weights(log_ratio.ravel())
     weights = np.exp(smoothed).reshape(log_ratio.shape)
-    per_batch = 2 * settings.target_ess // n_batches
-    shuffled = np.random.default_rng([request.seed, 1])
-    chosen = [shuffled.permutation(resample(batch / batch.sum(), per_batch, 0.5)) for batch in weights]
-    chain = request.make_chain(
-        np.stack([batch[rows] for batch, rows in zip(z, chosen, strict=True)]),
-        n_batches,
-        steps=n_draws,
-        acceptance=effective_sample_size(smoothed) / log_ratio.size,
-        sampler="importance",
+    per_batch, shuffled = 2 * settings.target_ess // n_batches, np.random.default_rng([request.seed, 1])
+    chosen = np.stack([shuffled.permutation(resample(row / row.sum(), per_batch, 0.5)) for row in weights])
+    every = {**parameters, **derived}
+    equal = {name: np.take_along_axis(values, chosen, axis=1) for name, values in every.items()}
+    of_batches = request.diagnose(equal, n_batches)
+    of_weights = diagnose_weighted(
+        np.stack([values.ravel() for values in every.values()], axis=1), weights.ravel(), tuple(every)
     )
-    every = {p.name: z[..., i].ravel() for i, p in enumerate(request.posterior.model.space.free)}
-    every |= {name: np.asarray(values) for name, values in request.quantities(z.reshape(-1, z.shape[-1])).items()}
-    of_weights = diagnose_weighted(np.stack(list(every.values()), axis=1), weights.ravel(), tuple(every))
-    diagnostics = {
-        name: replace(chain.diagnostics[name], ess_bulk=d.ess_bulk, ess_tail=d.ess_tail, mcse_mean=d.mcse_mean, drift=0.0)
-        for name, d in of_weights.items()
-    }
+    diagnostics = {name: replace(d, r_hat=of_batches[name].r_hat, drift=0.0) for name, d in of_weights.items()}
     reasons = (
         *describe_uneven_weights(pareto_k, log_ratio.size),
         *describe_convergence_shortfalls(diagnostics, settings.target_r_hat, settings.target_ess),
     )
-    return replace(chain, diagnostics=diagnostics, reasons=reasons, pareto_k=pareto_k)
+    return Chain(
+        np.take_along_axis(z, chosen[..., None], axis=1),
+        {name: equal[name] for name in derived},
+        diagnostics,
+        n_batches,
+        steps=n_draws,
+        acceptance=effective_sample_size(smoothed) / log_ratio.size,
+        reasons=reasons,
+        sampler="importance",
+        pareto_k=pareto_k,
+    )

@@ -11,7 +11,7 @@ from math import lgamma
 
 import numpy as np
 
-_DEGREES_OF_FREEDOM = 5  # of the Student t distributions: tails wide enough that importance weights stay bounded
+DEGREES_OF_FREEDOM = 5  # of the Student t distributions: tails wide enough that importance weights stay bounded
 _EM_STEPS = 4  # steps of expectation and maximization that refine a mixture
 _LEAST_PART_SHARE = 1e-3  # share below which a component keeps its center, since hardly any draw is near
 _SHRINKAGE = 0.5  # factor on the covariance of all draws, toward which a component with few draws is shrunk
@@ -25,11 +25,13 @@ class StudentMixture:
         center: Centers, (component, parameter).
         root: Roots R of the scale matrices R R^T, (component, parameter, parameter).
         share: Weights of the components, which sum to 1.
+        freedom: Degrees of freedom of every component.
     """
 
     center: np.ndarray
     root: np.ndarray
     share: np.ndarray
+    freedom: int = DEGREES_OF_FREEDOM
 
     @cached_property
     def _inverse(self) -> np.ndarray:
@@ -40,7 +42,7 @@ class StudentMixture:
         part = np.searchsorted(np.cumsum(self.share), (np.arange(count) + generator.uniform()) / count)
         part = np.minimum(part, len(self.share) - 1)
         rows = generator.standard_normal((count, self.center.shape[1]))
-        wide = np.sqrt(_DEGREES_OF_FREEDOM / generator.chisquare(_DEGREES_OF_FREEDOM, count))
+        wide = np.sqrt(self.freedom / generator.chisquare(self.freedom, count))
         for i in range(len(self.share)):
             members = part == i
             rows[members] = self.center[i] + wide[members, None] * (rows[members] @ self.root[i].T)
@@ -59,14 +61,10 @@ class StudentMixture:
 
     def _log_components(self, squares: np.ndarray) -> np.ndarray:
         """Return the log of weight times density of every component, (row, component)."""
-        size = self.center.shape[1]
-        constant = (
-            lgamma((_DEGREES_OF_FREEDOM + size) / 2)
-            - lgamma(_DEGREES_OF_FREEDOM / 2)
-            - size / 2 * np.log(_DEGREES_OF_FREEDOM * np.pi)
-        )
+        size, freedom = self.center.shape[1], self.freedom
+        constant = lgamma((freedom + size) / 2) - lgamma(freedom / 2) - size / 2 * np.log(freedom * np.pi)
         log_factor = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
-        return log_factor - (_DEGREES_OF_FREEDOM + size) / 2 * np.log1p(squares / _DEGREES_OF_FREEDOM)
+        return log_factor - (freedom + size) / 2 * np.log1p(squares / freedom)
 
     def refine(self, rows: np.ndarray) -> "StudentMixture":
         """Return the mixture after some steps of expectation and maximization toward draws.
@@ -79,7 +77,7 @@ class StudentMixture:
             squares = mixture._squared_distances(rows)
             logs = mixture._log_components(squares)
             membership = np.exp(logs - _log_sum(logs)[:, None]) / count
-            pulled = membership * (_DEGREES_OF_FREEDOM + size) / (_DEGREES_OF_FREEDOM + squares)
+            pulled = membership * (self.freedom + size) / (self.freedom + squares)
             share = np.maximum(membership.sum(axis=0), np.finfo(float).tiny)
             near = share > _LEAST_PART_SHARE
             middle = pulled.T @ rows / np.maximum(pulled.sum(axis=0), np.finfo(float).tiny)[:, None]
@@ -92,7 +90,7 @@ class StudentMixture:
             )
             scale = (1 - few) * scale / share[:, None, None] + few * _SHRINKAGE * overall_covariance
             share = np.maximum(share, _LEAST_PART_SHARE)
-            mixture = StudentMixture(center, np.linalg.cholesky(scale), share / share.sum())
+            mixture = StudentMixture(center, np.linalg.cholesky(scale), share / share.sum(), self.freedom)
         return mixture
 
     def with_wide_component(self, rows: np.ndarray, times: float, share: float) -> "StudentMixture":
@@ -108,19 +106,21 @@ class StudentMixture:
             np.concatenate([self.center, rows.mean(axis=0, keepdims=True)]),
             np.concatenate([self.root, root[None]]),
             np.append((1 - share) * self.share, share),
+            self.freedom,
         )
 
 
-def start_mixture(rows: np.ndarray, parts: int) -> StudentMixture:
-    """Return a mixture centered at some of many draws, to be refined.
+def start_mixture(rows: np.ndarray, parts: int, freedom: int = DEGREES_OF_FREEDOM) -> StudentMixture:
+    """Return a mixture centered at some of many draws, evenly spaced in their order, to be refined.
 
     Args:
         rows: Draws, one a row.
         parts: Number of components.
+        freedom: Degrees of freedom of every component.
     """
     some = ((np.arange(parts) + 0.5) / parts * len(rows)).astype(int)
     root = np.linalg.cholesky(_SHRINKAGE * regularized_covariance(rows))
-    return StudentMixture(rows[some], np.stack([root] * parts), np.full(parts, 1 / parts))
+    return StudentMixture(rows[some], np.stack([root] * parts), np.full(parts, 1 / parts), freedom)
 
 
 def regularized_covariance(rows: np.ndarray) -> np.ndarray:

@@ -109,8 +109,8 @@ class BenchErrors(Frozen):
 class SamplerSettings(Frozen):
     """How long and how carefully the posterior is sampled, by emcee's ensembles of walkers, by NUTS, or by both.
 
-    Where no method is stated, walkers do. Where one density takes milliseconds (dahl and lugre), importance sampling does, and
-    walkers only if its draws do not suffice.
+    Where no method is stated, importance sampling serves few parameters whose scatter the readings determine, and densities
+    that take milliseconds (dahl and lugre); walkers follow if its draws do not suffice, and serve everything else.
 
     `max_steps` is that of each walker or chain, and does not count the warm-up of NUTS. Walkers of which nothing is said are
     as many as it takes to fit a distribution to half of them, and enough to draw from at the first look.

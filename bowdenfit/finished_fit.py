@@ -15,7 +15,7 @@ from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.questions.check.words import check_sentences
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.words import comparison_blocks
-from bowdenfit.questions.error_budget import ErrorBudget, error_budget
+from bowdenfit.questions.error_budget import ErrorBudget, error_budget, with_bench_errors
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,
@@ -35,6 +35,7 @@ from bowdenfit.questions.summary.page import Summary, summarize
 from bowdenfit.questions.summary.verdict import Verdict, assess_fit
 from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES
+from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
 from bowdenfit.results.store import make_data_tree, save
@@ -111,6 +112,14 @@ class Fit(Record):
             UsageError: The fit has no draws.
         """
         return make_data_tree(self)
+
+    def optimal_length(self) -> OptimalLength:
+        """Return the best length, how certain it is with the errors of the bench, and what the choices cost.
+
+        Raises:
+            UsageError: The description has no route to vary, or there is no posterior.
+        """
+        return with_bench_errors(super().optimal_length(), self.error_budget)
 
     def correlation(self) -> "DataFrame":
         """Return the correlations of the draws of all parameters, as a square table.

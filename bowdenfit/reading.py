@@ -50,6 +50,7 @@ class Reading(TypedDict, total=False):
         geometry: How wrap angles follow the length: one curve over the whole range, or regions with dropped angles as
             the on-body paper has them.
         undetected: How angles too small to detect enter.
+        errors: "none" leaves errors of the bench that no reading shows out of the intervals.
         wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
         sheet: Title of the sheet of a workbook that is a single file.
         join: File of a second logger with the output force, where the file of the data set has the input force alone.
@@ -68,6 +69,7 @@ class Reading(TypedDict, total=False):
     undetected: Annotated[
         Literal["censored", "zero", "dropped"] | None, Parameter(show_default="as in cable.toml, else censored")
     ]
+    errors: Annotated[Literal["none"] | None, Parameter(show_default="as in cable.toml, else the usual ones")]
     wrap_angle: Annotated[Quantity | None, Parameter(metavar="ANGLE"), number_with_unit("180deg")]
     sheet: Annotated[str | None, Parameter(metavar="TITLE", show_default="the one with the readings")]
     join: Annotated["str | Path | None", Parameter(metavar="FILE"), PATH]
@@ -80,6 +82,7 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
     "friction": "friction_model",
     "noise": "noise",
 }
+_NO_ERRORS = ("errors.gain=0", "errors.hysteresis=0", "errors.angle={value=0,unit='deg'}", "errors.angle_scale=0")
 
 
 @read_first
@@ -137,7 +140,8 @@ def changed_settings(reading: Reading) -> list[str]:
         reading: The keywords.
     """
     stated = {key: reading.get(name) for name, key in _SETTINGS.items()}
-    return [*reading.get("settings", ()), *(f'{key}="{value}"' for key, value in stated.items() if value is not None)]
+    by_name = [f'{key}="{value}"' for key, value in stated.items() if value is not None]
+    return [*reading.get("settings", ()), *(_NO_ERRORS if reading.get("errors") else ()), *by_name]
 
 
 def refuse_named(reading: Reading, why: str, remedy: str) -> None:

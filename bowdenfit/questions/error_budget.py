@@ -39,6 +39,7 @@ from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import find_row_angles
 from bowdenfit.kinds.terms import TERMS
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
+from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
 from bowdenfit.words import counted, filled, listed, table
 
@@ -48,7 +49,8 @@ _NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then 
 # Median deviations at which the score of a draw is cut off: of a normal distribution hardly any is beyond 10, and where scatter
 # is nearly nothing some 5 % of the draws are, so that a shift is at most that much too small; a judgement.
 _FARTHEST_SCORE = 10.0
-TITLE = "Error budget: what bench errors that readings cannot reveal would add"
+TITLE = "Error budget: what bench errors that readings cannot reveal add"
+_INCLUDED = "The intervals of the first page include them."
 KEY_ROLES = ("friction", "friction_model", "angle", "elastic")  # of coefficients that are answers, not means to them
 
 
@@ -115,10 +117,10 @@ class ErrorBudget(Display):
         notable = [row for row in self.rows if row.is_notable]
         known = listed([source.words for source in self.sources])
         if not notable:
-            return [f"Bench errors that readings cannot reveal ({known}) would add less than half to each interval."]
+            return [f"Bench errors that readings cannot reveal ({known}) add less than half to each interval. {_INCLUDED}"]
         return [
-            f"Bench errors that readings cannot reveal ({known}) would add more than half to the interval of "
-            f"{listed([row.quantity for row in notable])}; state your own under [errors] in cable.toml."
+            f"Bench errors that readings cannot reveal ({known}) add more than half to the interval of "
+            f"{listed([row.quantity for row in notable])}; state your own under [errors] in cable.toml. {_INCLUDED}"
         ]
 
     def _table(self) -> Rows:
@@ -152,7 +154,8 @@ def error_budget(fit: Record) -> ErrorBudget | None:
             for source, steps in uncertainties
         }
         readings = Interval.of(draws)
-        rows.append(BudgetRow(name, unit, readings, _widened(readings, list(shifts.values())), shifts))
+        bench = _widened(readings, list(shifts.values()), _limits(fit, name, readings))
+        rows.append(BudgetRow(name, unit, readings, bench, shifts))
     return ErrorBudget(tuple(source for source, _ in uncertainties), tuple(rows))
 
 
@@ -247,13 +250,21 @@ def _with_constant_angles(data: Any, cable: Cable, error: BenchError) -> Any:
     return replace(data, angles=replace(angles, own=own_angles, is_own=is_own))
 
 
-def _widened(readings: Interval, shifts: list[float]) -> Interval:
-    """Return an interval with further independent uncertainties; a quantity that is never negative stays so."""
+def _limits(fit: Record, name: str, readings: Interval) -> tuple[float, float]:
+    """Return the limits of a quantity: the range of a route, 0 and 1 of an efficiency, 0 of what is never negative."""
+    route = fit.dataset.description.route
+    if name == OPTIMAL_LENGTH and route is not None:
+        return route.range
+    return 0.0 if readings.q05 >= 0 else -np.inf, 1.0 if name == OPTIMAL_EFFICIENCY else np.inf
+
+
+def _widened(readings: Interval, shifts: list[float], limits: tuple[float, float]) -> Interval:
+    """Return an interval with further independent uncertainties, cut off at the limits of its quantity."""
     added = sqrt(sum(shift**2 for shift in shifts))
     low = readings.median - np.hypot(readings.median - readings.q05, NORMAL_90 * added)
     high = readings.median + np.hypot(readings.q95 - readings.median, NORMAL_90 * added)
-    lowest = 0.0 if readings.q05 >= 0 else -np.inf
-    return replace(readings, sd=float(np.hypot(readings.sd, added)), q05=max(float(low), lowest), q95=float(high))
+    q05, q95 = max(float(low), limits[0]), min(float(high), limits[1])
+    return replace(readings, sd=float(np.hypot(readings.sd, added)), q05=q05, q95=q95)
 
 
 HEADS = ("quantity", "readings alone", "with errors", "angles", "gain", "hysteresis")
@@ -287,10 +298,30 @@ def budget_section(fit: Record) -> PageSection | None:
     return prose_section(TITLE, budget.sentences(), [PageTable(HEADS, tuple(budget_rows(budget)))]) if budget else None
 
 
+def answer_interval(fit: Record, quantity: str) -> Interval:
+    """Return the interval of a parameter that people copy: with the errors of the bench where the budget has it.
+
+    Args:
+        fit: The fit, with draws.
+        quantity: Name of a parameter.
+    """
+    budget = error_budget(fit)
+    row = budget.row(quantity) if budget is not None else None
+    return row.bench if row is not None else fit.parameter(quantity)
+
+
+def with_bench_errors(best: OptimalLength, budget: ErrorBudget | None) -> OptimalLength:
+    """Return the best length and its efficiency with intervals that include the errors of the bench."""
+    rows = {} if budget is None else {row.quantity: row.bench for row in budget.rows}
+    length, efficiency = rows.get(OPTIMAL_LENGTH, best.length), rows.get(OPTIMAL_EFFICIENCY, best.efficiency)
+    return replace(best, length=length, efficiency=efficiency)
+
+
 def widening_sentence(fit: Record) -> str:
     """Return what the errors of the bench make of the first answer that they more than half widen; empty if of none.
 
-    'Including bench errors that readings cannot reveal, mu is 0.166 to 0.186, mainly from wrap angles known to 3 deg or 3 %.'
+    'The interval of mu includes bench errors that readings cannot reveal, mainly wrap angles known to 3 deg or 3 %; readings
+    alone would say 0.174 to 0.178.'
     """
     budget = error_budget(fit)
     notable = [row for row in budget.rows if row.is_notable] if budget else []
@@ -301,9 +332,8 @@ def widening_sentence(fit: Record) -> str:
     source = next(source.words for source in budget.sources if source.name == row.largest)
     unit = "" if row.unit == "1" else f" {row.unit}"
     others = counted(len(notable) - 1, "other answer")
-    also = f" ({others} also widen{'s' if len(notable) == 2 else ''})" if len(notable) > 1 else ""
-    interval = row.bench.range_text(row.readings.digits)
+    also = f" (and of {others})" if len(notable) > 1 else ""
     return (
-        f"Including bench errors that readings cannot reveal, {name} is {interval}{unit}{also}, mainly from {source}; state "
-        "yours under [errors] in cable.toml."
+        f"The interval of {name}{also} includes bench errors that readings cannot reveal, mainly {source}; readings alone "
+        f"would say {row.readings.range_text(row.readings.digits)}{unit}. State your own errors under [errors] in cable.toml."
     )

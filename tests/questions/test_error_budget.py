@@ -1,9 +1,12 @@
 """The error budget: slopes of the answers by errors of the bench agree with fits of tables that have these errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.description.defaults import BenchErrors
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.questions.error_budget import ErrorBudget
@@ -60,19 +63,39 @@ def test_a_constant_angle_has_its_error_too(tmp_path):
     assert row.shifts["wrap angles"] == pytest.approx(row.readings.median * 0.03 / np.sqrt(3), rel=0.1)
 
 
-def test_a_precise_bench_shows_both_intervals_on_the_first_page(tmp_path):
+def test_the_first_page_of_a_precise_bench_has_the_interval_with_bench_errors_and_says_so(tmp_path):
     fit = bf.fit(bench(tmp_path / "table.csv", noise=5e-4), seed=1)
-    page = " ".join(str(fit).split())
-    assert "Including bench errors that readings cannot reveal, mu is" in page
-    assert "state yours under [errors] in cable.toml." in page
-    assert "with bench errors" in page
-    assert budget_of(fit).row("mu").is_notable
+    page, row = " ".join(str(fit).split()), budget_of(fit).row("mu")
+    assert row.is_notable
+    assert f"coefficient of friction {row.bench}." in page
+    assert "The interval of mu includes bench errors that readings cannot reveal, mainly wrap angles" in page
+    assert f"readings alone would say {row.readings.range_text(row.readings.digits)}. State your own errors" in page
     assert fit.summary()["error_budget"]["rows"][0]["bench"]["q05"] < fit.parameter("mu").q05
 
 
-def test_a_scattering_bench_shows_the_interval_of_its_readings(fit):
+def test_the_first_page_of_a_scattering_bench_has_that_interval_too(fit):
+    row = budget_of(fit).row("mu")
     assert "bench" not in str(fit)
-    assert "would add less than half to each interval" in budget_of(fit).sentences()[0]
+    assert row.bench.range_text(row.bench.digits) in str(fit)
+    assert "add less than half to each interval" in budget_of(fit).sentences()[0]
+
+
+def test_without_errors_of_the_bench_the_first_page_has_the_interval_of_the_readings(tmp_path):
+    fit = bf.fit(bench(tmp_path / "table.csv", noise=5e-4), seed=1, errors="none")
+    interval = fit.parameter("mu")
+    assert fit.error_budget is None
+    assert interval.range_text(interval.digits) in str(fit)
+
+
+def test_the_best_length_includes_them_and_stays_within_its_range(quick_fit):
+    best, row = quick_fit.optimal_length(), budget_of(quick_fit).row("optimal_length")
+    assert best.length == row.bench and best.efficiency == budget_of(quick_fit).row("optimal_efficiency").bench
+    assert best.length.sd > row.readings.sd
+    description = quick_fit.dataset.description
+    wrong = description.model_copy(update={"errors": BenchErrors(angle_scale=50, gain=9)})
+    wide = replace(quick_fit, dataset=replace(quick_fit.dataset, description=wrong)).optimal_length()
+    assert (wide.length.q05, wide.length.q95) == description.route.range
+    assert wide.efficiency.q95 == 1
 
 
 def test_stated_errors_replace_the_usual_ones_or_leave_the_budget(tmp_path):

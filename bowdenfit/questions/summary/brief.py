@@ -15,7 +15,7 @@ from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.data_set_words import describe_assumed_decimals
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
-from bowdenfit.questions.error_budget import KEY_ROLES, error_budget, widening_sentence
+from bowdenfit.questions.error_budget import KEY_ROLES, answer_interval, widening_sentence
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
@@ -39,7 +39,6 @@ LINES = 25  # fit on one terminal of usual height
 _LONGEST_NAME, _LONGEST_READING = 44, 36  # characters of names in a line of 80
 _LEAST_QUANTITIES, _MOST_QUANTITIES, _MOST_OUTLIERS = 4, 8, 3  # rows
 _OTHER_LINES = 7  # lines that are neither sentences nor rows: headings, what is left out, blank lines, the last one
-WITH_BENCH = "with bench errors"
 _LEAST_ROOM = 12  # characters of a line in which words can be wrapped; a judgement
 READING_HEADS = ("measured", "expected", "90 % interval")
 _MORE = "Everything else: bowdenfit summary --full"
@@ -125,10 +124,6 @@ def _quantity_blocks(fit: Record, lines: int) -> tuple[list[Block], bool]:
     interval_width = max(len(q.interval) for q in shown)
     rows: list[tuple[str, ...]] = [(q.name, q.value, f"{q.interval:>{interval_width}} {q.unit}".rstrip()) for q in shown]
     heads: tuple[str, ...] = ("", "value", f"{'90 % interval':>{interval_width}}")
-    if widened := _widened_intervals(fit, [q.name for q in shown]):
-        wider_rows = [(*row, text) for row, text in zip(rows, widened, strict=True)]
-        wider = (*heads, WITH_BENCH)
-        heads, rows = (wider, wider_rows) if _table_width(wider, wider_rows) <= WIDTH else (heads, rows)
     room = WIDTH - _table_width(heads, rows) - 2
     more = len(rows_to_show) - len(shown)
     meanings, spare = list[str](), lines - len(shown) + (more <= 0)
@@ -145,15 +140,6 @@ def _quantity_blocks(fit: Record, lines: int) -> tuple[list[Block], bool]:
 def _table_width(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
     """Return the width of a table as text."""
     return max(map(len, table(heads, rows, left=heads[2:]).splitlines()))
-
-
-def _widened_intervals(fit: Record, names: Sequence[str]) -> list[str]:
-    """Return intervals with errors of the bench, of coefficients by name; empty where these more than half widen none."""
-    budget = error_budget(fit)
-    rows = [budget.row(name) if budget is not None else None for name in names]
-    if not any(row is not None and row.is_notable for row in rows):
-        return []
-    return [row.bench.range_text(row.readings.digits) if row is not None else "" for row in rows]
 
 
 def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:
@@ -240,7 +226,8 @@ def _key_quantity(fit: Record, parameter: Parameter) -> KeyQuantity | None:
     if parameter.fixed is not None:
         return KeyQuantity(parameter.name, description, unit, f"{parameter.fixed * parameter.shown_scale:.4g}", "as stated")
     if fit.sampled is not None:
-        return KeyQuantity(parameter.name, description, unit, *_format_posterior(fit.parameter(parameter.name).times(scale)))
+        interval = answer_interval(fit, parameter.name).times(scale)
+        return KeyQuantity(parameter.name, description, unit, *_format_posterior(interval))
     estimate = fit.least_squares.estimates.get(parameter.name)
     return KeyQuantity(parameter.name, description, unit, *_format_estimate(estimate)) if estimate is not None else None
 

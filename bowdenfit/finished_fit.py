@@ -96,7 +96,7 @@ class Fit(Record):
 
     @property
     def error_budget(self) -> ErrorBudget | None:
-        """What usual errors of a bench, which its readings cannot show, would add to each interval; None without draws."""
+        """What usual errors of a bench, which its readings cannot show, add to each interval; None without draws."""
         return error_budget(self)
 
     @property

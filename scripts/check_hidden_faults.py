@@ -2,7 +2,7 @@
 
 Twelve kinds of fault, each drawn from its usual size, on tables of forces of a capstan that shares no code with the package.
 Printed for each kind: how often the 90 % interval of mu holds it, by the readings alone and with the errors of the bench, and
-how often the first page shows both. Benches whose fit is refused or not trusted count as neither.
+how often the first page says that they more than half widen it. Benches whose fit is refused or not trusted count as neither.
 
     .venv/bin/python scripts/check_hidden_faults.py --benches 20 --seed 1
 """

@@ -50,7 +50,7 @@ class Reading(TypedDict, total=False):
         geometry: How wrap angles follow the length: one curve over the whole range, or regions with dropped angles as
             the on-body paper has them.
         undetected: How angles too small to detect enter.
-        errors: "none" leaves errors of the bench that no reading shows out of the intervals.
+        errors: Errors of the bench that no reading shows; "none" leaves them out of the intervals.
         wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
         sheet: Title of the sheet of a workbook that is a single file.
         join: File of a second logger with the output force, where the file of the data set has the input force alone.

@@ -33,7 +33,7 @@ from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table, shown
 
-_CHOICES = ("noise", "friction", "geometry", "undetected")  # options that the command repeats
+_CHOICES = ("noise", "friction", "geometry", "undetected", "errors")  # options that the command repeats
 ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
 _LEFT = ("column", "unit", "read as")  # columns aligned to the left
 _MAX_NAMED = 8  # channels whose first and last sample are named

@@ -99,7 +99,7 @@ def make_walker_sweep(
 
         # In two turns before the first step each half is evaluated where it is, so that only one evaluation is compiled.
         half = len(z) // 2
-        halves = tuple(Walkers(rows, rows, *jnp.zeros((3, half))) for rows in (z[:half], z[half:]))
+        halves = _unknown_walkers(z[:half]), _unknown_walkers(z[half:])
         bits = choices.bits.reshape(-1, *choices.bits.shape[2:])
         uniform = to_uniform(jnp.concatenate([jnp.zeros_like(bits[:2]), bits]))
         kinds = jnp.concatenate([jnp.zeros(2, choices.kinds.dtype), jnp.repeat(choices.kinds, 2)])
@@ -109,6 +109,11 @@ def make_walker_sweep(
         return ended.z, ended.value, ended.accepted
 
     return sweep
+
+
+def _unknown_walkers(z: Array) -> Walkers:
+    """Return walkers at z whose densities are not known yet."""
+    return Walkers(z, z, *jnp.zeros((3, len(z))))
 
 
 def _apply_map(frame: CoordinateMap, is_z: Array, points: Array, data: Any) -> tuple[Array, Array, Array]:

@@ -41,7 +41,7 @@ from bowdenfit.kinds.terms import TERMS
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
-from bowdenfit.words import counted, filled, listed, table
+from bowdenfit.words import filled, listed, table
 
 _DRAWS = 4096  # a covariance of so many is known to 2 %; more would only take longer
 _STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
@@ -318,22 +318,22 @@ def with_bench_errors(best: OptimalLength, budget: ErrorBudget | None) -> Optima
 
 
 def widening_sentence(fit: Record) -> str:
-    """Return what the errors of the bench make of the first answer that they more than half widen; empty if of none.
+    """Return what the first answer would be that bench errors more than half widen; empty if they do not.
 
-    'The interval of mu includes bench errors that readings cannot reveal, mainly wrap angles known to 3 deg or 3 %; readings
-    alone would say 0.174 to 0.178.'
+    'These intervals include bench errors, mainly wrap angles known to 3 deg or 3 % ([errors] in cable.toml); readings alone
+    say 0.174 to 0.178 for mu.'
     """
     budget = error_budget(fit)
     notable = [row for row in budget.rows if row.is_notable] if budget else []
     if budget is None or not notable:
         return ""
     row = next((row for row in notable if row.quantity == OPTIMAL_LENGTH), notable[0])
-    name = {OPTIMAL_LENGTH: "the best length", OPTIMAL_EFFICIENCY: "the efficiency there"}.get(row.quantity, row.quantity)
+    name = {OPTIMAL_LENGTH: "the best length", OPTIMAL_EFFICIENCY: "the efficiency"}.get(row.quantity, row.quantity)
     source = next(source.words for source in budget.sources if source.name == row.largest)
-    unit = "" if row.unit == "1" else f" {row.unit}"
-    others = counted(len(notable) - 1, "other answer")
-    also = f" (and of {others})" if len(notable) > 1 else ""
+    in_percent = row.quantity == OPTIMAL_EFFICIENCY
+    readings = row.readings.times(100) if in_percent else row.readings
+    unit = " %" if in_percent else "" if row.unit == "1" else f" {row.unit}"
     return (
-        f"The interval of {name}{also} includes bench errors that readings cannot reveal, mainly {source}; readings alone "
-        f"would say {row.readings.range_text(row.readings.digits)}{unit}. State your own errors under [errors] in cable.toml."
+        f"These intervals include bench errors, mainly {source} ([errors] in cable.toml); readings alone say "
+        f"{readings.range_text(readings.digits)}{unit} for {name}."
     )

@@ -68,8 +68,8 @@ def test_the_first_page_of_a_precise_bench_has_the_interval_with_bench_errors_an
     page, row = " ".join(str(fit).split()), budget_of(fit).row("mu")
     assert row.is_notable
     assert f"coefficient of friction {row.bench}." in page
-    assert "The interval of mu includes bench errors that readings cannot reveal, mainly wrap angles" in page
-    assert f"readings alone would say {row.readings.range_text(row.readings.digits)}. State your own errors" in page
+    assert "These intervals include bench errors, mainly wrap angles known to 3 deg or 3 % ([errors] in cable.toml);" in page
+    assert f"readings alone say {row.readings.range_text(row.readings.digits)} for mu." in page
     assert fit.summary()["error_budget"]["rows"][0]["bench"]["q05"] < fit.parameter("mu").q05
 
 

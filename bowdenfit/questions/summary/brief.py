@@ -105,8 +105,8 @@ def _sentences(fit: Record, purpose: Purpose) -> tuple[list[str], list[str]]:
     first, *further = summary_sentences(fit, purpose)
     first = first[0].lower() + first[1:]
     if fit_verdict.trusted:
-        # the lengths that are good enough
-        n_first = 1 if fit.dataset.description.route is not None and purpose == "design" else 0
+        # the lengths that are good enough, and the best one
+        n_first = 2 if fit.dataset.description.route is not None and purpose == "design" else 0
         answer = [f"{name}: {first}", *further[:n_first], widening_sentence(fit), *further[n_first:]]
         verdict = [*reasons_to_trust(fit), *describe_assumed_decimals(fit.dataset), suggest_next_step(fit)]
     else:

@@ -51,7 +51,7 @@ def test_the_summary_of_a_loop_is_one_page_that_says_which_preload_to_set(fit):
     page = summary_text(fit)
     assert faults(page) == []
     assert "Set the preload to 1" in page
-    assert "The interval of mu (and of " in page
+    assert "readings alone say 0." in page
 
 
 def test_the_plan_makes_the_data_set_that_is_there(tmp_path):

@@ -229,8 +229,8 @@ def write_page(compared: dict[str, tuple[list[Comparison], str]]) -> None:
         f"{counts.count('agrees')} agrees, {counts.count('wider')} are wider, {counts.count('differs')} differ, and "
         f"{counts.count('no value')} have no printed value. Nearly all are single mountings, printed without an "
         "uncertainty: the intervals say what such a number is worth.", "",
-        "Only numbers that were seen in a source are typed in; see [where they come "
-        "from](../../datasets/published/README.md).", "",
+        "Only numbers that were seen in a source are typed in; see "
+        "`datasets/published/README.md`.", "",
     ]  # fmt: skip
     for name, (comparisons, reasons) in compared.items():
         title, source, measured, concluded, reason = TABLES[name]

@@ -72,6 +72,21 @@ class ConditionDifference:
         return self.p_holm < LEVEL
 
 
+@dataclass(frozen=True)
+class ConditionCost:
+    """Mean net cost of one condition.
+
+    Args:
+        name: The condition.
+        mean: Mean over persons [W/kg].
+        error: Standard error of the mean [W/kg]; None where it was not printed.
+    """
+
+    name: str
+    mean: float
+    error: float | None
+
+
 @dataclass(frozen=True, repr=False)
 class Metabolic(Display):
     """Result of a study.
@@ -82,6 +97,7 @@ class Metabolic(Display):
         contradictions: Numbers that cannot all be right, a sentence each.
         order: Conditions in the order in which all persons walked; empty where each had its own.
         from_persons: Whether it follows from each person's numbers, not from what was printed.
+        costs: Mean of each condition that is compared, in the order of the study.
     """
 
     name: str
@@ -90,6 +106,7 @@ class Metabolic(Display):
     contradictions: tuple[str, ...]
     order: tuple[str, ...]
     from_persons: bool
+    costs: tuple[ConditionCost, ...] = ()
 
     JSON: ClassVar = (...,)
 
@@ -116,9 +133,24 @@ def analyze_study(study: Study, costs: MetabolicCosts | None) -> Metabolic:
         )
     adjusted = adjust_p_values([two_sided_p(mean / error, n) for _, _, n, mean, error, _ in pairs])
     comparisons = tuple(_compare(*pair, p) for pair, p in zip(pairs, adjusted.tolist(), strict=True))
+    compared = {name for comparison in comparisons for name in (comparison.condition, comparison.less)}
     return Metabolic(
-        study.name, study.source, comparisons, tuple(find_contradictions(study)), study.order, costs is not None
-    )
+        study.name, study.source, comparisons, tuple(find_contradictions(study)), study.order, costs is not None,
+        tuple(cost for cost in _condition_costs(study, costs) if cost.name in compared),
+    )  # fmt: skip
+
+
+def _condition_costs(study: Study, costs: MetabolicCosts | None) -> Iterator[ConditionCost]:
+    """Yield the mean of each condition, measured or as printed."""
+    if costs is None:
+        for printed in study.condition:
+            if printed.mean is not None:
+                yield ConditionCost(printed.name, float(printed.mean), None if printed.sem is None else float(printed.sem))
+        return
+    for name, column in zip(costs.conditions, costs.net.T, strict=True):
+        walked = column[np.isfinite(column)]
+        if len(walked) >= 2:
+            yield ConditionCost(name, *mean_and_error(walked))
 
 
 def _pairs_from_persons(costs: MetabolicCosts) -> list[tuple[str, str, int, float, float, float]]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bowdenfit import route_angles
 from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import override
@@ -228,6 +229,10 @@ def read_dataset(
     """
     faults = faults or Faults()
     measurements, checksums, accounts = Measurements(), dict(sha256), tuple[RowAccount, ...]()
+    if description.has_routes:
+        description, routes, remarks = route_angles.measure_routes(description, folder)
+        measurements = Measurements((), remarks)
+        checksums |= {name: _sha256(path) for name, path in routes.items()}
     for kind in KINDS.values():
         settings = description.tables.stated.get(kind.name)
         if settings is None:

@@ -227,6 +227,11 @@ class Description(Display, Frozen):
         return angle.curve is not None and (angle.departure or _DEPARTURE[self.geometry]) == "smooth"
 
     @property
+    def has_routes(self) -> bool:
+        """Whether a wrap angle is still to be measured along a route of points."""
+        return any(c.wrap_angle.route is not None for c in self.contact)
+
+    @property
     def curved(self) -> tuple[Contact, ...]:
         """Contacts whose wrap angle is a curve."""
         return tuple(c for c in self.contact if c.wrap_angle.curve)

@@ -53,7 +53,7 @@ class Route(Frozen):
 
 
 class WrapAngle(Frozen):
-    """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
+    """Where a contact's wrap angle comes from: a curve through the angle table, each row, a constant, or points of a route."""
 
     curve: Choice | None = None
     column: Name | None = None
@@ -63,9 +63,16 @@ class WrapAngle(Frozen):
     value: NonNegative | None = None
     unit: str | None = None
     sd: Positive | None = None
+    route: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    path: Literal["polyline", "spline"] | None = None
+    error: QuantityValue | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> "WrapAngle":
+        if self.route is not None:
+            return self._checked_route()
+        if self.path is not None or self.error is not None:
+            raise ValueError('path and error belong to points along a route, such as { route = "points.csv", path = "spline" }')
         if (self.value is None) == (self.column is None):
             raise ValueError(
                 'write either { value = 45, unit = "deg" } or { column = "..." }, with curve where it has one'
@@ -82,6 +89,19 @@ class WrapAngle(Frozen):
             raise ValueError('curve = "smooth" has no family to depart from: leave departure out, or name a family')
         if self.nominal is not None and self.curve is not None:
             raise ValueError("nominal belongs to an angle measured in each row, without a curve")
+        return self
+
+    def _checked_route(self) -> "WrapAngle":
+        others = (self.curve, self.column, self.departure, self.published_range, self.nominal, self.value, self.unit, self.sd)
+        if any(other is not None for other in others):
+            raise ValueError("route gives the wrap angle; beside it only path and error may be written")
+        if self.error is not None and (self.error.value < 0 or self.error.sd is not None):
+            raise ValueError('error is the standard deviation of each coordinate, such as { value = 1, unit = "mm" }')
+        if self.path == "spline" and (self.error is None or self.error.value == 0):
+            raise ValueError(
+                'path = "spline" needs the standard deviation of each coordinate, by which it smooths: '
+                'error = { value = 1, unit = "mm" }'
+            )
         return self
 
     @property

@@ -121,6 +121,7 @@ def _quantities(description: Description) -> list[Stated]:
     return [
         *((f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact),
         *((f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact),
+        *((f"contact {c.name!r}, error", c.wrap_angle.error, "length") for c in description.contact),
         *((f"contact {c.name!r}, length", c.length, "length") for c in description.contact if c.length != "route"),
         ("sensors, force_noise", sensors.force_noise, "force"),
         ("sensors, input_force_noise", sensors.input_force_noise, "force"),

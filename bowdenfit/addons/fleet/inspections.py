@@ -8,6 +8,7 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
+from bowdenfit import route_angles
 from bowdenfit.addons.fleet.answer import FailedInspection
 from bowdenfit.addons.fleet.folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
 from bowdenfit.addons.fleet.pieces import input_hash
@@ -287,6 +288,8 @@ def _read_common_description(folder: Path, reading: Reading) -> Description:
     description = load_description(
         path, changed_settings(reading), parse_sources(reading.get("columns", ()), "--column")
     )
+    if description.has_routes:
+        description, _, _ = route_angles.measure_routes(description, folder)
     tables = description.tables.stated
     if len(tables) != 1 or not hasattr(next(iter(tables.values())), "files"):
         raise DescriptionError(

@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit import route_angles
 from bowdenfit.csv_tables import csv_table
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.description import Description
@@ -83,6 +84,8 @@ def read_bench(path: Path) -> BenchPlan:
     truth = parse_truth(raw, path.name)
     cable = {name: value for name, value in raw.items() if name not in {"design", "fleet", "truth"}}
     description = parse_description(cable, path.name)
+    if description.has_routes:
+        description, _, _ = route_angles.measure_routes(description, path.parent)
     if (description.sensors.input_ratio, description.sensors.output_ratio) != (1.0, 1.0):
         raise DescriptionError(
             f"{path.name}: a simulated bench writes the forces on the rope, so that [sensors] input_ratio and output_ratio "

@@ -273,8 +273,8 @@ def metabolic_rows() -> list[Row]:
     """Return the rows of the metabolic cost."""
     study, command = bowdenfit("metabolic", "datasets/on-body-metabolic"), "`bowdenfit metabolic datasets/on-body-metabolic`"
     means = "6.3 ± 0.148, 5.91 ± 0.116 and 5.78 ± 0.108 W/kg"
-    drawn = f"{command[:-1]} -o FOLDER`"
-    rows = [Row("section 3.3, figure 18: means and their errors", means, drawn, "-", remark="given; drawn as the figure is")]
+    figure = f"{command[:-1]} -o FOLDER`"
+    rows = [Row("section 3.3, figure 18: means and their errors", means, figure, "-", remark="given; drawn as the figure is")]
     change = r"^([-+][0-9.]+) %"
     differences = (
         ("470 mm against none", "-8.25 %, P = 0.0016 (given)", "470 mm no exoskeleton", (("-8.25", change),), ""),

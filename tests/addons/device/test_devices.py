@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from figure_words import assert_answer_readable
+from measured_touches import touch, write_touch
 from terminal_pages import faults as faults_of_page
 
 import bowdenfit as bf
@@ -17,6 +18,7 @@ from bowdenfit.addons.device.description import read_device
 from bowdenfit.addons.device.loop import draw_loop
 from bowdenfit.addons.device.mechanics.limits import moves_by_itself
 from bowdenfit.addons.device.teleoperate import teleoperation_figure
+from bowdenfit.addons.device.teleoperate.measured import read_measured_contact
 from bowdenfit.addons.device.teleoperate.stability import detect_bouncing, find_hardest_wall
 from bowdenfit.errors import DescriptionError, UsageError
 
@@ -359,6 +361,33 @@ def test_words_and_files_of_teleoperation_can_be_read(saved, run, tmp_path):
     assert len(page["schemes"][0]["stable"]) == len(page["walls"]) == len(page["schemes"][0]["bounces_in_simulation"])
     assert (tmp_path / "answer" / "teleoperation.png").stat().st_size > 10_000
     assert run(*command, "--csv")[1].startswith("coupling,wall_stiffness_N*m/rad,stable")
+
+
+def test_a_measured_touch_is_compared_with_what_a_hand_feels(fit, saved, run, tmp_path):
+    """The touch that was simulated with median parameters agrees while the loop is taut, and is softer once it is slack."""
+    answer = bf.teleoperate(fit, DEVICE, wrap_angle="180deg")
+    contact = answer.contact
+    columns = (contact.time, contact.master, contact.hand_torque, contact.slave, contact.wall_torque)
+    taut = contact.time < 2.5
+    same = write_touch(tmp_path / "touch.csv", *(column[taut] for column in columns))
+    slack = read_measured_contact(write_touch(tmp_path / "slack.csv", *columns))
+    assert slack.stiffness.compare(answer.stated.stiffness) == "below"
+    measured = bf.teleoperate(fit, DEVICE, wrap_angle="180deg", measured=same).measured
+    assert measured.wall.value == pytest.approx(answer.wall, rel=0.05)
+    assert measured.stiffness.compare(answer.stated.stiffness) == "agrees"
+    assert measured.free_torque.compare(answer.stated.free_torque) == "agrees"
+    other = write_touch(tmp_path / "other.csv", *touch(stiffness=60.0, friction=0.02))
+    command = ("teleoperate", saved, DEVICE, "--wrap-angle", "180deg", "--measured")
+    _, out, _ = run(*command, other, "--output", tmp_path / "answer")
+    text = " ".join(out.split())
+    assert "Measured, other.csv: 0.02 N*m in free motion" in text
+    assert "below the 90 % interval" in text and "above the 90 % interval" in text
+    assert "The slave met a wall of 95 N*m/rad; 100 N*m/rad are stated." in text
+    assert faults_of_page(out) == []
+    assert json.loads((tmp_path / "answer" / "teleoperation.json").read_text())["measured"]["in_contact"] > 100
+    code, out, err = run(*command, write_touch(tmp_path / "none.csv", *(column[:5] for column in touch())))
+    assert (code, out) == (2, "")
+    assert "and 20 are needed" in err
 
 
 def test_the_figure_of_teleoperation_is_readable(remote):

@@ -6,9 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from bowdenfit.addons.device.teleoperate.measured import MeasuredContact, MeasuredValue
 from bowdenfit.display import Block, Display, ResultTable, Rows, blocks_of, separate
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import listed, percent, significant
+from bowdenfit.words import counted, listed, percent, significant
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class Teleoperation(Display):
         at_wall: Probability that contact with that one is stable, with the coupling as stated.
         schemes: The coupling as stated, with two channels, and with local feedback.
         contact: One device through time.
+        measured: A wall touch that was measured; None without one.
     """
 
     cable: str
@@ -95,6 +97,11 @@ class Teleoperation(Display):
     at_wall: float
     schemes: tuple[CouplingScheme, ...]
     contact: SimulatedContact
+    measured: MeasuredContact | None = None
+
+    JSON: ClassVar = (
+        "cable", "device", "bends", "probability", "draws", "walls", "wall", "at_wall", "schemes", "contact", "measured?"
+    )  # fmt: skip
 
     @property
     def stated(self) -> CouplingScheme:
@@ -136,6 +143,7 @@ def sentences(answer: Teleoperation) -> list[str]:
             *_instability_sentences(answer),
             *_simulation_sentences(answer),
             *_contrast_sentences(answer),
+            *_measured_sentences(answer),
         )
         if sentence
     ]
@@ -214,6 +222,41 @@ def _contrast_sentences(answer: Teleoperation) -> Iterator[str]:
         yield (
             "They differ about the stated wall (exit code 3): rely on neither before it was tried on the device."
         )
+
+
+def _measured_sentences(answer: Teleoperation) -> Iterator[str]:
+    """Say what was measured at a wall, and whether the intervals of the coupling as stated agree."""
+    contact, stated = answer.measured, answer.stated
+    if contact is None:
+        return
+    parts = []
+    if contact.free_torque is not None:
+        parts.append(_compare(contact.free_torque, stated.free_torque, "N*m in free motion"))
+    if stated.stiffness is not None:
+        parts.append(_compare(contact.stiffness, stated.stiffness, "N*m/rad in contact"))
+    else:
+        parts.append(f"{significant(contact.stiffness.value)} N*m/rad in contact, where the fit gives none")
+    yield (
+        f"Measured, {contact.file}: {'; '.join(parts)}. The slave met a wall of {significant(contact.wall.value)} N*m/rad; "
+        f"{answer.wall:.4g} N*m/rad are stated."
+    )
+    if stated.stiffness is not None and contact.stiffness.compare(stated.stiffness) == "below":
+        yield (
+            "Where one side of the loop goes slack, its stiffness is half; if the measured one is too low for that reason, "
+            "record a touch with less torque."
+        )
+    if contact.left_wall:
+        yield f"The slave left the wall {counted(contact.left_wall, 'time')}: it was released, or bounced."
+
+
+def _compare(measured: MeasuredValue, interval: Interval, what: str) -> str:
+    """Return a measured value next to the interval of the fit, in words."""
+    verdict = measured.compare(interval)
+    words = "which agrees with" if verdict == "agrees" else verdict
+    return (
+        f"{significant(measured.value)} {what} (standard error {significant(measured.error, 2)}), {words} the 90 % interval "
+        f"{significant(interval.q05)} to {significant(interval.q95)}"
+    )
 
 
 def _describe_quiet(answer: Teleoperation, quiet: Sequence[str]) -> str:

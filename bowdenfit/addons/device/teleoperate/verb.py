@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 NAME = "teleoperation"
 PROBABILITY = 0.95  # with which contact must be stable
+MEASURED = Parameter(
+    metavar="FILE", help="A wall touch that was measured, such as touch.csv: angle and torque of master and slave."
+)
 DEVICE = Parameter("DEVICE", help="Such as device.toml, which describes master, slave, hand and wall.")
 
 
@@ -25,6 +28,7 @@ def teleoperate(
     device: Annotated[str | Path, DEVICE, PATH],
     *,
     wrap_angle: Bends = None,
+    measured: Annotated[str | Path | None, MEASURED, PATH] = None,
     seed: Annotated[Seed, Parameter(show_default="that of the fit")] = None,
     output: Output = None,
 ) -> "Teleoperation":
@@ -34,15 +38,18 @@ def teleoperate(
         fit: The fit.
         device: A device.toml that describes master, slave, hand, wall, and what is sent between them.
         wrap_angle: Range of wrap angles that the cable is bent to.
+        measured: Table of a wall touch that was measured: angle and torque of master and slave.
         seed: Random seed.
         output: Folder for teleoperation.json, the text and the figure.
 
     Raises:
         UsageError: The fit is of no loop, has no posterior, or was not measured at these wrap angles.
         DescriptionError: Something that the answer needs is not said by the device, or has no sd.
+        DatasetError: The table cannot be used.
         StoreError: `output` cannot be written.
     """
-    answer = _teleoperate.assess_teleoperation(fit.with_seed(seed), Path(device), wrap_angle, PROBABILITY)
+    touch = None if measured is None else Path(measured)
+    answer = _teleoperate.assess_teleoperation(fit.with_seed(seed), Path(device), wrap_angle, PROBABILITY, touch)
     if output is not None:
         text = f"{answer}\n"
         write_answer(output, NAME, answer, text, {NAME: _teleoperate.teleoperation_figure}, fit.name)

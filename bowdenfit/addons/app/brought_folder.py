@@ -66,6 +66,9 @@ def _named_files(description: Description) -> Iterator[str]:
         yield recording.file
         if recording.output_file is not None:
             yield recording.output_file
+    for contact in description.contact:
+        if contact.wrap_angle.route is not None:
+            yield contact.wrap_angle.route
 
 
 def _stated_place(name: str) -> PurePosixPath:

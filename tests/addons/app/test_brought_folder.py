@@ -55,6 +55,18 @@ def test_recordings_go_into_the_folder_that_their_cable_toml_names(draft):
     assert (draft.folder / "angles.csv").is_file()
 
 
+def test_points_of_a_route_go_where_cable_toml_names_them(draft):
+    angle = '{ route = "shape/points.csv" }'
+    cable = f'name = "c"\n[[contact]]\nname = "s"\nfriction = "mu"\nwrap_angle = {angle}\n'
+    draft.new_file("cable.toml").write_text(f'schema = 1\n{cable}[tables]\nforces = {{ file = "forces.csv" }}\n')
+    draft.new_file("forces.csv").write_text("input_force_N,output_force_N\n20,15\n40,29.5\n60,44\n")
+    draft.new_file("points.csv").write_text("x_mm,y_mm\n0,0\n50,0\n50,80\n")
+    understanding = draft.understand()
+    assert understanding.refusals == ()
+    assert "wrap angle 90.0 deg" in " ".join(understanding.report.split())
+    assert (draft.folder / "shape" / "points.csv").is_file()
+
+
 def test_a_file_goes_where_a_pattern_finds_it_and_comes_back_when_the_description_changes(draft):
     assert bring(draft, cable=describe_half_turn('files = "runs/*/**/*.csv"'), one=TABLE).refusals == ()
     assert [path.relative_to(draft.folder).as_posix() for path in draft.files] == ["runs/files/one.csv"]

@@ -22,7 +22,6 @@ from bowdenfit.addons.device.mechanics.teleoperation import (
     transmitted_stiffness,
 )
 from bowdenfit.addons.device.teleoperate.answer import CouplingScheme, SimulatedContact, Teleoperation
-from bowdenfit.addons.device.teleoperate.measured import read_measured_contact
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.record import Record
@@ -174,9 +173,7 @@ def detect_bouncing(time: np.ndarray, wall_torque: np.ndarray) -> bool | None:
     return bool(np.any(wall_torque[time > time[contact[0]] + SETTLED] == 0))
 
 
-def assess_teleoperation(
-    fit: Record, path: Path, bends: Bends, probability: float, measured: Path | None = None
-) -> Teleoperation:
+def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: float) -> Teleoperation:
     """Assess transmitted torque, stiffness and stability of all coupling schemes.
 
     Args:
@@ -184,13 +181,10 @@ def assess_teleoperation(
         path: A device.toml that describes master, slave, hand, wall and coupling.
         bends: Range of wrap angles.
         probability: With which contact must be stable.
-        measured: A table of a wall touch that was measured.
 
     Raises:
         UsageError, DescriptionError: The fit does not tell it, or something that it needs is not stated.
-        DatasetError: The table cannot be used.
     """
-    touch = None if measured is None else read_measured_contact(measured)
     device = read_device_with_ring_down(fit, path)
     angles = read_bends(fit, bends)
     loop = draw_loop(fit, angles, device, np.ones(1))
@@ -236,7 +230,6 @@ def assess_teleoperation(
         stable_at_wall,
         schemes,
         simulator.trace(gains),
-        touch,
     )
 
 

@@ -1,5 +1,6 @@
 """The verb `teleoperate`: what a hand feels of a remote wall through a cable."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -48,8 +49,9 @@ def teleoperate(
         DatasetError: The table cannot be used.
         StoreError: `output` cannot be written.
     """
-    touch = None if measured is None else Path(measured)
-    answer = _teleoperate.assess_teleoperation(fit.with_seed(seed), Path(device), wrap_angle, PROBABILITY, touch)
+    touch = None if measured is None else _teleoperate.read_measured_contact(Path(measured))
+    answer = _teleoperate.assess_teleoperation(fit.with_seed(seed), Path(device), wrap_angle, PROBABILITY)
+    answer = replace(answer, measured=touch)
     if output is not None:
         text = f"{answer}\n"
         write_answer(output, NAME, answer, text, {NAME: _teleoperate.teleoperation_figure}, fit.name)

@@ -4,7 +4,7 @@
 
 writes `docs/evidence/measurements.md`. `datasets/published/printed.csv` has the values that authors print, each with the range
 that is rounded to it or that they state, and the verdict expected of it. Each data set is fitted with seed 1. The verdict
-follows from its 90 % interval:
+follows from its 90 % interval, that of the first page, which includes errors of the bench:
 
 - differs: the fit is not trusted (exit code 3), or its interval does not contain the printed value, or, where the authors
   state a range, has no value in common with it;
@@ -23,10 +23,9 @@ from dataclasses import dataclass
 from math import exp, radians
 from pathlib import Path
 
-import numpy as np
-
 import bowdenfit as bf
 from bowdenfit.finished_fit import Fit
+from bowdenfit.questions.error_budget import answer_interval
 from bowdenfit.words import significant
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -198,9 +197,8 @@ def interval_of(fit: Fit, row: dict[str, str]) -> tuple[float, float, float] | N
         best = fit.optimal_length()
         answer, scale = (best.length, 1.0) if row["as"] == "mm" else (best.efficiency, 100.0)
         return answer.median * scale, answer.q05 * scale, answer.q95 * scale
-    middle, low, high = (
-        float(q) for q in np.quantile(np.ravel(fit.posterior.values[row["parameter"]]), (0.5, 0.05, 0.95))
-    )
+    answer = answer_interval(fit, row["parameter"])
+    middle, low, high = answer.median, answer.q05, answer.q95
     if not row["at_deg"]:
         return middle, low, high
     angle = radians(float(row["at_deg"]))
@@ -222,7 +220,8 @@ def write_page(compared: dict[str, tuple[list[Comparison], str]]) -> None:
         "# Other people's measurements", "",
         "Published readings of ropes and cables, what their authors concluded, and what bowdenfit says. This page is made by "
         "`scripts/published_measurements.py`, which fits each data set with seed 1 and compares. *differs*: the fit is not "
-        "trusted, or its 90 % interval does not contain the printed value (has no value in common with a printed range); "
+        "trusted, or its 90 % interval (that of the first page, with errors of the bench) does not contain the printed "
+        "value, or has no value in common with a printed range; "
         f"*wider*: it does, and is more than {WIDER} times as wide as what the authors state, or, where they state no "
         "uncertainty, as the rounding of their number; *agrees*: it does, and is not; *no value*: none was printed.", "",
         f"{len(compared) - 1} tables are here, one of them read in two ways. Of {len(counts)} comparisons "

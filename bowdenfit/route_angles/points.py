@@ -16,7 +16,7 @@ from bowdenfit.words import shown
 _AXES = tuple(Quantity(name, "length") for name in "xyz")
 _MOST_POINTS = 2000  # of a route: a scan of a sheath every millimeter; a judgement
 _LEAST_ERROR = 1e-6  # rad; below it an angle is exact
-_LARGEST_SHARE, _LARGEST_ERROR = 0.1, 3.0  # of the angle, and deg: one of both must hold; a judgement
+_LARGEST_SHARE, _LARGEST_ERROR = 0.07, 3.0  # of the angle, and deg: one of both must hold; a judgement
 
 
 def measure_routes(description: Description, folder: Path) -> tuple[Description, dict[str, Path], tuple[str, ...]]:

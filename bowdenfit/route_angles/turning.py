@@ -14,7 +14,7 @@ _DEGREE = 3
 _FINE = 801  # tangents along a spline; a judgement: 0.01 deg on ten turns
 _REPETITIONS = 200  # of the errors; the standard deviation is then known to 5 %
 _MOST_PIECES = 40  # of a spline; a judgement: ten full turns
-_SHAPE = 0.03  # of the angle of a spline: what is left on circles and helices (tests/route_angles); a judgement
+_SHAPE = 0.04  # of the angle of a spline: what is left on circles, helices and an S of two arcs; a judgement
 _SEED = 1  # of the errors, so that a file always gives the same angle
 Points = Float[np.ndarray, "points dimensions"]
 

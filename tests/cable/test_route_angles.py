@@ -76,6 +76,21 @@ def test_what_errors_add_to_a_polyline_is_taken_off():
     assert sum(abs(route.angle - angle) < 1.645 * route.sd for route in routes) >= 48
 
 
+def test_a_spline_through_a_kinked_sheath_is_too_uncertain_to_be_used():
+    """Straight, round 90 deg, and straight again: of 20 routes at most two would be used, and those contain the angle."""
+    bend = 60 * np.pi / 2
+    along = np.linspace(0, 200 + bend, 20)
+    turned = np.clip(along - 100, 0, bend) / 60
+    x = np.minimum(along, 100) + 60 * np.sin(turned)
+    y = 60 - 60 * np.cos(turned) + np.maximum(along - 100 - bend, 0)
+    points, generator = np.column_stack([x, y]), np.random.default_rng(7)
+    for error in (0.3, 1.0):
+        routes = [measure_spline(points + generator.normal(0, error, points.shape), error) for _ in range(20)]
+        usable = [route for route in routes if route.sd <= max(0.07 * route.angle, np.radians(3))]
+        assert len(usable) <= 2
+        assert all(abs(route.angle - np.pi / 2) < 1.645 * route.sd for route in usable)
+
+
 @pytest.fixture
 def write(tmp_path):
     """Write a data set whose angle comes from points, and return its folder."""

@@ -55,7 +55,7 @@ for command in sys.argv[1].split(";"):
         codes.append(stop.code)
 print("codes", *codes)
 """
-FEW = "--set,sampler.n_walkers=32,--set,sampler.target_ess=100,--set,sampler.target_r_hat=1.1"
+FEW = "--sampler,emcee,--set,sampler.n_walkers=32,--set,sampler.target_ess=100,--set,sampler.target_r_hat=1.1"
 
 
 @pytest.mark.extended

@@ -335,15 +335,17 @@ class ForceTerms(TermKind[ForceTable]):
 
     @override
     def covariates(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
-        """Return the load of each run, where each was made at one load and these differ; its group, numbered from 1."""
+        """Return the load of each run, where each was made at one load and these differ; its group, numbered from 1.
+
+        Loads differ where both forces do: against one hung weight, the input force differs by friction and noise alone.
+        """
         if not isinstance(term, RunsTerm) or term.rows is None:
             return {}
         runs, run = np.unique(term.rows.run, return_inverse=True)
-        load, covariates = term.rows.input_force, dict[str, np.ndarray]()
-        low, high = np.full(len(runs), np.inf), np.zeros(len(runs))
-        np.minimum.at(low, run, load)
-        np.maximum.at(high, run, load)
-        if np.all(high <= _ONE_LOAD * low) and high.max() > _ONE_LOAD**2 * low.min():
+        covariates = dict[str, np.ndarray]()
+        low, high = _range_in_runs(term.rows.input_force, run)
+        ends = (low, high), _range_in_runs(term.rows.output_force, run)
+        if np.all(high <= _ONE_LOAD * low) and all(most.max() > _ONE_LOAD**2 * least.min() for least, most in ends):
             covariates[LOAD] = (low + high) / 2
         if table.group:
             names = term.cable.friction.conditions.groups
@@ -361,3 +363,11 @@ class ForceTerms(TermKind[ForceTable]):
             heading: replace(column, numbers=np.bincount(run, column.numbers) / np.bincount(run))
             for heading, column in term.rows.unused.items()
         }
+
+
+def _range_in_runs(force: np.ndarray, run: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest force of each run, numbered from 0."""
+    low, high = np.full(run.max() + 1, np.inf), np.zeros(run.max() + 1)
+    np.minimum.at(low, run, force)
+    np.maximum.at(high, run, force)
+    return low, high

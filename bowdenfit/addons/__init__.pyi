@@ -1,3 +1,5 @@
+from bowdenfit.addons.certificate.verbs import cell as cell
+from bowdenfit.addons.certificate.verbs import certificate as certificate
 from bowdenfit.addons.device.compensate.verb import compensate as compensate
 from bowdenfit.addons.device.teleoperate.verb import teleoperate as teleoperate
 from bowdenfit.addons.fleet.pool.verb import pool as pool

@@ -140,7 +140,7 @@ def error_budget(fit: Record) -> ErrorBudget | None:
         fit: The fit.
     """
     uncertainties = list(_standard_errors(fit))
-    quantities = _answers(fit) if fit.sampled is not None else {}
+    quantities = list_answers(fit) if fit.sampled is not None else {}
     if not quantities or not uncertainties:
         return None
     chosen = np.linspace(0, len(fit.draws().flat_z) - 1, _DRAWS).astype(int)
@@ -183,7 +183,7 @@ def _standard_errors(fit: Record) -> Iterator[tuple[ErrorSource, dict[BenchError
         yield ErrorSource("hysteresis", words), {BenchError(hysteresis=_STEP): stated.hysteresis * of_both_cells}
 
 
-def _answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
+def list_answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
     """Return unit and draws of every coefficient, the best length and the efficiency there."""
     draws, free = fit.draws(), fit.model.space.free
     quantities = {p.name: (p.unit, draws.values[p.name].ravel()) for p in free if p.role in KEY_ROLES}

@@ -1,0 +1,234 @@
+"""A certificate as a PTB Digital Calibration Certificate: XML of the schema DCC 3.2.1, with numbers and units of D-SI 2.1.0.
+
+The schemas are PTB's (https://www.ptb.de/dcc, https://www.ptb.de/si) and no part of this package.
+"""
+
+import math
+from datetime import date
+from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
+
+from bowdenfit.addons.certificate.answer import Certificate, CertifiedQuantity
+from bowdenfit.addons.certificate.conformity import DECISION_WORDS, ConformityStatement
+from bowdenfit.addons.certificate.laboratory import MeasuringConditions, Party
+from bowdenfit.addons.certificate.safe_xml import DCC, ROOT, SI
+from bowdenfit.addons.certificate.wording import describe_limits, describe_risks, describe_rule
+from bowdenfit.errors import UsageError
+from bowdenfit.results.record import Record
+from bowdenfit.units import conversion_factor, dimension_of
+from bowdenfit.words import printable
+
+SCHEMA_VERSION = "3.2.1"
+UNITS = {  # of D-SI for the internal units of `bowdenfit.units`, by what they measure
+    "force": r"\newton",
+    "length": r"\milli\metre",
+    "angle": r"\radian",
+    "time": r"\second",
+    "velocity": r"\milli\metre\second\tothe{-1}",
+    "angular_velocity": r"\radian\second\tothe{-1}",
+    "torque": r"\newton\milli\metre",
+    "ratio": r"\one",
+    "stiffness": r"\newton\milli\metre\tothe{-1}",
+    "rate": r"\second\tothe{-1}",
+}
+METHODS = {
+    "uncertainty budget": "JCGM 100:2008",
+    "propagation of distributions": "JCGM 101:2008",
+    "statement of conformity": "JCGM 106:2012",
+}
+CELSIUS, PERCENT = r"\degreecelsius", r"\percent"
+
+
+def certificate_xml(fit: Record, certificate: Certificate) -> bytes:
+    """Return a certificate as XML.
+
+    Args:
+        fit: The fit.
+        certificate: Its certificate.
+
+    Raises:
+        UsageError: A quantity has a unit that D-SI does not have.
+    """
+    register_namespace("dcc", DCC)
+    register_namespace("si", SI)
+    root = Element(ROOT, {"schemaVersion": SCHEMA_VERSION})
+    _add_administration(SubElement(root, f"{{{DCC}}}administrativeData"), fit, certificate)
+    _add_results(_add(root, "measurementResults"), fit, certificate)
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _add(parent: Element, name: str, text: str | float | date | None = None, **attributes: str) -> Element:
+    """Add an element of the DCC, with a text that XML can hold; return it."""
+    element = SubElement(parent, f"{{{DCC}}}{name}", attributes)
+    if text is not None:
+        element.text = printable(str(text))
+    return element
+
+
+def _add_text(parent: Element, name: str, text: str) -> Element:
+    """Add an element with a text in English; return it."""
+    element = _add(parent, name)
+    _add(element, "content", text, lang="en")
+    return element
+
+
+def _add_administration(parent: Element, fit: Record, certificate: Certificate) -> None:
+    stated, version = certificate.laboratory, fit.provenance.versions.get("bowdenfit", "unknown")
+    software = _add(_add(parent, "dccSoftware"), "software")
+    _add_text(software, "name", "bowdenfit")
+    _add(software, "release", version)
+    core = _add(parent, "coreData")
+    _add(core, "countryCodeISO3166_1", stated.laboratory.country)
+    _add(core, "usedLangCodeISO639_1", "en")
+    _add(core, "mandatoryLangCodeISO639_1", "en")
+    _add(core, "uniqueIdentifier", stated.number)
+    _add(core, "beginPerformanceDate", stated.measured.begin)
+    _add(core, "endPerformanceDate", stated.measured.end)
+    _add(core, "performanceLocation", "laboratory")
+    _add(core, "issueDate", stated.issued)
+    item = _add(_add(parent, "items"), "item")
+    _add_text(item, "name", stated.item.name)
+    if stated.item.manufacturer is not None:
+        _add_text(_add(item, "manufacturer"), "name", stated.item.manufacturer)
+    if stated.item.model is not None:
+        _add(item, "model", stated.item.model)
+    identification = _add(_add(item, "identifications"), "identification")
+    _add(identification, "issuer", "manufacturer")
+    _add(identification, "value", stated.item.serial)
+    laboratory = _add(parent, "calibrationLaboratory")
+    if stated.laboratory.accreditation is not None:
+        _add(laboratory, "calibrationLaboratoryCode", stated.laboratory.accreditation)
+    _add_contact(laboratory, "contact", stated.laboratory)
+    persons = _add(parent, "respPersons")
+    for number, signature in enumerate(stated.signature):
+        person = _add(persons, "respPerson")
+        _add_text(_add(person, "person"), "name", signature.name or signature.role)
+        _add(person, "role", signature.role)
+        _add(person, "mainSigner", "true" if number == 0 else "false")
+    _add_contact(parent, "customer", stated.customer)
+    statements = _add(parent, "statements")
+    for statement in certificate.statements:
+        _add_conformity(statements, statement, certificate.quantity(statement.quantity))
+    for remark in certificate.remarks:
+        _add_text(_add(statements, "statement"), "declaration", remark)
+
+
+def _add_contact(parent: Element, name: str, party: Party) -> None:
+    contact = _add(parent, name)
+    _add_text(contact, "name", party.name)
+    if party.email is not None:
+        _add(contact, "eMail", party.email)
+    location = _add(contact, "location")
+    for key, value in (("street", party.street), ("postCode", party.post_code), ("city", party.city)):
+        _add(location, key, value)
+    _add(location, "countryCode", party.country)
+
+
+def _add_conformity(parent: Element, statement: ConformityStatement, quantity: CertifiedQuantity) -> None:
+    element = _add(parent, "statement", refType="basic_conformity")
+    _add_text(element, "name", f"{quantity.name} {describe_limits(statement, quantity)}")
+    rule, risks = describe_rule(statement, quantity), describe_risks(statement)
+    _add_text(element, "description", f"The item {DECISION_WORDS[statement.decision]}. {rule}. {risks}")
+    _add(element, "norm", "JCGM 106:2012")
+    first, *rest = statement.decision.split()
+    _add(element, "conformity", first + "".join(word.capitalize() for word in rest))
+
+
+def _add_results(parent: Element, fit: Record, certificate: Certificate) -> None:
+    stated, result = certificate.laboratory.measured, _add(parent, "measurementResult")
+    _add_text(result, "name", fit.name)
+    methods = _add(result, "usedMethods")
+    for name, norm in METHODS.items():
+        method = _add(methods, "usedMethod")
+        _add_text(method, "name", name)
+        _add(method, "norm", norm)
+    if stated.method:
+        _add_text(_add(methods, "usedMethod"), "name", stated.method)
+    if certificate.cells:
+        _add_cells(_add(result, "measuringEquipments"), certificate)
+    if stated.temperature_degC is not None or stated.humidity_percent is not None:
+        _add_conditions(_add(result, "influenceConditions"), stated)
+    results = _add(result, "results")
+    for quantity in certificate.quantities:
+        _add_result(results, quantity)
+    sums = "; ".join(f"{name} {digest}" for name, digest in fit.dataset.sha256.items())
+    provenance = f"Seed {fit.provenance.seed}. SHA-256 of the input files: {sums}."
+    _add_text(_add(_add(result, "measurementMetaData"), "metaData"), "declaration", provenance)
+
+
+def _add_cells(parent: Element, certificate: Certificate) -> None:
+    for stated, cell in certificate.cells:
+        equipment = _add(parent, "measuringEquipment")
+        _add_text(
+            equipment,
+            "name",
+            f"load cell at the {stated.end} end" if stated.end != "both" else "load cells of both ends",
+        )
+        words = f"{stated.cell}: certificate {cell.number} of {cell.issued_by}, {cell.issued}; relative expanded uncertainty"
+        _add_text(
+            equipment,
+            "description",
+            f"{words} {cell.gain_error_sd * cell.coverage_factor:.2g} (k = {cell.coverage_factor:g})",
+        )
+
+
+def _add_conditions(parent: Element, stated: MeasuringConditions) -> None:
+    for name, ends, unit in (
+        ("temperature", stated.temperature_degC, CELSIUS),
+        ("humidityRelative", stated.humidity_percent, PERCENT),
+    ):
+        if ends is None:
+            continue
+        condition = _add(parent, "influenceCondition", refType=f"basic_{name}")
+        _add_text(condition, "name", "air temperature" if name == "temperature" else "relative humidity of the air")
+        data = _add(condition, "data")
+        for end, word in zip(ends, ("Min", "Max"), strict=True):
+            _add_real(_add(data, "quantity", refType=f"basic_{name}{word}"), end, unit)
+
+
+def _add_result(parent: Element, quantity: CertifiedQuantity) -> None:
+    """Add a result: the value with its expanded uncertainty, its effective degrees of freedom, and its budget."""
+    factor, unit = _to_si(quantity.unit)
+    result = _add(parent, "result")
+    _add_text(result, "name", f"{quantity.name}: {quantity.meaning}")
+    low, high = (quantity.in_unit(end) for end in quantity.interval)
+    _add_text(result, "description", f"{100 * quantity.probability:g} % coverage interval {low} to {high}")
+    data = _add(result, "data")
+    value = _add(data, "quantity", refType="basic_measuredValue")
+    _add_text(value, "name", quantity.meaning)
+    real = _add_real(value, factor * quantity.value, unit)
+    expanded = SubElement(real, f"{{{SI}}}expandedUnc")
+    stated = (factor * quantity.expanded, quantity.factor, quantity.probability)
+    for key, number in zip(("uncertainty", "coverageFactor", "coverageProbability"), stated, strict=True):
+        SubElement(expanded, f"{{{SI}}}{key}").text = f"{number:.6g}"
+    if math.isfinite(quantity.degrees):
+        degrees = _add(data, "quantity")
+        _add_text(degrees, "name", "effective degrees of freedom")
+        _add_real(degrees, quantity.degrees, UNITS["ratio"])
+    for component in quantity.budget:
+        part = _add(data, "quantity")
+        _add_text(part, "name", f"standard uncertainty, type {component.evaluation}: {component.name}")
+        _add_real(part, factor * component.standard, unit)
+
+
+def _add_real(parent: Element, number: float, unit: str) -> Element:
+    """Add a number with its unit; return the element."""
+    real = SubElement(parent, f"{{{SI}}}real")
+    SubElement(real, f"{{{SI}}}value").text = f"{number:.9g}"
+    SubElement(real, f"{{{SI}}}unit").text = unit
+    return real
+
+
+def _to_si(unit: str) -> tuple[float, str]:
+    """Return the factor to a unit of D-SI, and that unit.
+
+    Raises:
+        UsageError: D-SI has none.
+    """
+    dimension = dimension_of(unit) if unit != "1" else "ratio"
+    if dimension not in UNITS:
+        raise UsageError(
+            f"the unit {unit!r} has no counterpart in D-SI here; the usual cause is a [route] in a unit of its own: write the "
+            "route in mm, or in another unit of length or angle, and fit again."
+        )
+    return conversion_factor(unit, dimension) if unit != "1" else 1.0, UNITS[dimension]

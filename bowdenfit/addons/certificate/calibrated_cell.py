@@ -196,8 +196,8 @@ def _read_numbers(quantity: Element, paths: tuple[str, ...], name: str) -> Vecto
 
 
 def _text(element: Element, path: str) -> str:
-    """Return the text at a path without what cannot be printed; empty where there is none."""
-    return printable((element.findtext(path, "", _NAMES) or "").strip())
+    """Return the text at a path on one line, without what cannot be printed; empty where there is none."""
+    return printable(" ".join((element.findtext(path, "", _NAMES) or "").split()))
 
 
 def _refusal(place: str, fault: str, cause: str, fix: str) -> DatasetError:

@@ -4,6 +4,7 @@ The schemas are PTB's (https://www.ptb.de/dcc, https://www.ptb.de/si) and no par
 """
 
 import math
+import re
 from datetime import date
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
@@ -14,22 +15,23 @@ from bowdenfit.addons.certificate.safe_xml import DCC, ROOT, SI
 from bowdenfit.addons.certificate.wording import describe_limits, describe_risks, describe_rule
 from bowdenfit.errors import UsageError
 from bowdenfit.results.record import Record
-from bowdenfit.units import conversion_factor, dimension_of
+from bowdenfit.units import INTERNAL_UNITS, conversion_factor, dimension_of
 from bowdenfit.words import printable
 
 SCHEMA_VERSION = "3.2.1"
-UNITS = {  # of D-SI for the internal units of `bowdenfit.units`, by what they measure
-    "force": r"\newton",
-    "length": r"\milli\metre",
-    "angle": r"\radian",
-    "time": r"\second",
-    "velocity": r"\milli\metre\second\tothe{-1}",
-    "angular_velocity": r"\radian\second\tothe{-1}",
-    "torque": r"\newton\milli\metre",
-    "ratio": r"\one",
-    "stiffness": r"\newton\milli\metre\tothe{-1}",
-    "rate": r"\second\tothe{-1}",
+UNITS = {  # of D-SI, which writes powers as \tothe
+    "1": r"\one",
+    "%": r"\percent",
+    "N": r"\newton",
+    "mm": r"\milli\metre",
+    "cm": r"\centi\metre",
+    "m": r"\metre",
+    "deg": r"\degree",
+    "rad": r"\radian",
+    "s": r"\second",
+    "kg": r"\kilogram",
 }
+_FACTOR = re.compile(r"([*/]?)([^*/^]+)(?:\^(\d))?")
 METHODS = {
     "uncertainty budget": "JCGM 100:2008",
     "propagation of distributions": "JCGM 101:2008",
@@ -188,7 +190,7 @@ def _add_conditions(parent: Element, stated: MeasuringConditions) -> None:
 
 def _add_result(parent: Element, quantity: CertifiedQuantity) -> None:
     """Add a result: the value with its expanded uncertainty, its effective degrees of freedom, and its budget."""
-    factor, unit = _to_si(quantity.unit)
+    factor, unit = to_si(quantity.unit)
     result = _add(parent, "result")
     _add_text(result, "name", f"{quantity.name}: {quantity.meaning}")
     low, high = (quantity.in_unit(end) for end in quantity.interval)
@@ -204,7 +206,7 @@ def _add_result(parent: Element, quantity: CertifiedQuantity) -> None:
     if math.isfinite(quantity.degrees):
         degrees = _add(data, "quantity")
         _add_text(degrees, "name", "effective degrees of freedom")
-        _add_real(degrees, quantity.degrees, UNITS["ratio"])
+        _add_real(degrees, quantity.degrees, UNITS["1"])
     for component in quantity.budget:
         part = _add(data, "quantity")
         _add_text(part, "name", f"standard uncertainty, type {component.evaluation}: {component.name}")
@@ -219,16 +221,27 @@ def _add_real(parent: Element, number: float, unit: str) -> Element:
     return real
 
 
-def _to_si(unit: str) -> tuple[float, str]:
-    """Return the factor to a unit of D-SI, and that unit.
+def to_si(unit: str) -> tuple[float, str]:
+    r"""Return the factor to a unit of D-SI, and that unit, such as `\milli\metre\degree\tothe{-1}` for mm/deg.
+
+    Args:
+        unit: Unit as results show it.
 
     Raises:
         UsageError: D-SI has none.
     """
-    dimension = dimension_of(unit) if unit != "1" else "ratio"
-    if dimension not in UNITS:
+    factors = _FACTOR.findall(unit)
+    if all(name in UNITS for _, name, _ in factors):
+        parts = []
+        for sign, name, power in factors:
+            exponent = int(power or 1) * (-1 if sign == "/" else 1)
+            if name != "1" or len(factors) == 1:
+                parts.append(UNITS[name] + (f"\\tothe{{{exponent}}}" if exponent != 1 else ""))
+        return 1.0, "".join(parts)
+    dimension = dimension_of(unit)
+    if dimension not in INTERNAL_UNITS:
         raise UsageError(
             f"the unit {unit!r} has no counterpart in D-SI here; the usual cause is a [route] in a unit of its own: write the "
-            "route in mm, or in another unit of length or angle, and fit again."
+            "route in mm or deg, and fit again."
         )
-    return conversion_factor(unit, dimension) if unit != "1" else 1.0, UNITS[dimension]
+    return conversion_factor(unit, dimension), to_si(INTERNAL_UNITS[dimension])[1]

@@ -31,6 +31,8 @@ COMMANDS = {  # what is typed behind each verb, and a word of what it prints
     "report": (("FIT", "-o", "TMP/report.html"), "report.html"),
     "simulate": (("DATASETS/synthetic-bench/bench.toml", "--seed", "1", "-o", "TMP/simulated"), "simulated"),
     "schema": (("cable",), "friction_model"),
+    "certificate": (("FIT", "DATASETS/../docs/files/laboratory.toml", "-o", "TMP/certified"), "expanded uncertainty"),
+    "cell": (("DATASETS/../docs/files/cell.xml",), "input_gain_error_sd = 0.0012"),
     "metabolic": (("DATASETS/on-body-metabolic",), "than no exoskeleton"),
 }
 MAY_DOUBT = {"calibrate", "pool", "metabolic", "fit", "teleoperate"}  # of two replications, of least squares alone, ...

@@ -10,6 +10,7 @@ from traps import caught, environment, run_among, run_until, set_traps
 from bowdenfit.cli.commands import COMMANDS
 
 DATASETS = Path(__file__).parents[2] / "datasets"
+LABORATORY = DATASETS.parent / "docs" / "files" / "laboratory.toml"
 FEW = ("--set", "sampler.n_walkers=32", "--set", "sampler.target_ess=100", "--set", "sampler.max_steps=400")
 START_A_FIT = """
 import sys, time
@@ -105,6 +106,8 @@ def make_commands(place, fit, loop):
         "report": ["report", fit, "-o", place / "report.html"],
         "simulate": ["simulate", DATASETS / "synthetic-bench" / "bench.toml", "-o", place / "simulated"],
         "metabolic": ["metabolic", DATASETS / "on-body-metabolic"],
+        "certificate": ["certificate", fit, LABORATORY, "-o", place / "certified"],
+        "cell": ["cell", LABORATORY.with_name("cell.xml")],
         "schema": ["schema", "cable"],
         "completion": ["completion", "bash"],
     }

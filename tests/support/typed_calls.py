@@ -22,6 +22,8 @@ def accepted(fit: bf.Fit) -> None:
     bf.export(fit, "c", "cable.h", at="90deg", points=51)
     bf.compensate(fit, "device.toml", wrap_angle="45deg:180deg", risk="5%")
     bf.teleoperate(fit, Path("device.toml"), wrap_angle=((45, "deg"), (180, "deg")))
+    bf.certificate(fit, "laboratory.toml", output=Path("certificates"), probability=0.99)
+    bf.cell("cell.xml", end="output")
     bf.next_measurement(fit, "mu1", ["angle@450", "force@470"], {"angle": 0.5})
     bf.next_measurement("fits/my-cable", top=3)
     bf.compare({"plain": fit, "rate": bf.load("fits/rate")}, leave_out="run")

@@ -261,8 +261,8 @@ def _refuse_understated_cells(fit: Record, cells: Sequence[tuple[CellCertificate
         UsageError: One is.
     """
     sensors, errors = fit.dataset.description.sensors, fit.dataset.description.errors
-    for stated, cell in cells:
-        for end in ("input", "output") if stated.end == "both" else (stated.end,):
+    for entry, cell in cells:
+        for end in ("input", "output") if entry.end == "both" else (entry.end,):
             sd = getattr(sensors, f"{end}_gain_error_sd")
             assumed = errors.gain / np.sqrt(3) if sd is None else sd
             if cell.gain_error_sd > _SAME * assumed:

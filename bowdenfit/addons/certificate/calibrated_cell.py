@@ -115,12 +115,12 @@ def read_load_cell(path: str | Path, end: Literal["input", "output"] = "input") 
             "a certificate of another kind of instrument, or from before refTypes were agreed",
             "read the gain error from the PDF, and write input_gain_error_sd by hand",
         )
-    stated = measured or error
-    assert stated is not None
-    if len(stated.values) != len(reference.values):
-        counts = f"{len(stated.values)} forces of the cell stand against {len(reference.values)} of the standard"
+    readings = measured or error
+    assert readings is not None
+    if len(readings.values) != len(reference.values):
+        counts = f"{len(readings.values)} forces of the cell stand against {len(reference.values)} of the standard"
         raise _refusal(f"{path.name}, dcc:quantity with refType {MEASURED}", counts, *_SHORTENED)
-    shown_force = stated.values if measured is not None else reference.values + stated.values
+    shown_force = readings.values if measured is not None else reference.values + readings.values
     uncertain = next((forces for forces in (measured, error) if forces is not None and forces.has_uncertainty), None)
     if uncertain is None:
         raise _refusal(

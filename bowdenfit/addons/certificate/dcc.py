@@ -37,6 +37,12 @@ METHODS = {
     "propagation of distributions": "JCGM 101:2008",
     "statement of conformity": "JCGM 106:2012",
 }
+CONFORMITY = {
+    "pass": "pass",
+    "conditional pass": "conditionalPass",
+    "conditional fail": "conditionalFail",
+    "fail": "fail",
+}
 CELSIUS, PERCENT = r"\degreecelsius", r"\percent"
 
 
@@ -75,39 +81,39 @@ def _add_text(parent: Element, name: str, text: str) -> Element:
 
 
 def _add_administration(parent: Element, fit: Record, certificate: Certificate) -> None:
-    stated, version = certificate.laboratory, fit.provenance.versions.get("bowdenfit", "unknown")
+    laboratory_file, version = certificate.laboratory, fit.provenance.versions.get("bowdenfit", "unknown")
     software = _add(_add(parent, "dccSoftware"), "software")
     _add_text(software, "name", "bowdenfit")
     _add(software, "release", version)
     core = _add(parent, "coreData")
-    _add(core, "countryCodeISO3166_1", stated.laboratory.country)
+    _add(core, "countryCodeISO3166_1", laboratory_file.laboratory.country)
     _add(core, "usedLangCodeISO639_1", "en")
     _add(core, "mandatoryLangCodeISO639_1", "en")
-    _add(core, "uniqueIdentifier", stated.number)
-    _add(core, "beginPerformanceDate", stated.measured.begin)
-    _add(core, "endPerformanceDate", stated.measured.end)
+    _add(core, "uniqueIdentifier", laboratory_file.number)
+    _add(core, "beginPerformanceDate", laboratory_file.measured.begin)
+    _add(core, "endPerformanceDate", laboratory_file.measured.end)
     _add(core, "performanceLocation", "laboratory")
-    _add(core, "issueDate", stated.issued)
+    _add(core, "issueDate", laboratory_file.issued)
     item = _add(_add(parent, "items"), "item")
-    _add_text(item, "name", stated.item.name)
-    if stated.item.manufacturer is not None:
-        _add_text(_add(item, "manufacturer"), "name", stated.item.manufacturer)
-    if stated.item.model is not None:
-        _add(item, "model", stated.item.model)
+    _add_text(item, "name", laboratory_file.item.name)
+    if laboratory_file.item.manufacturer is not None:
+        _add_text(_add(item, "manufacturer"), "name", laboratory_file.item.manufacturer)
+    if laboratory_file.item.model is not None:
+        _add(item, "model", laboratory_file.item.model)
     identification = _add(_add(item, "identifications"), "identification")
     _add(identification, "issuer", "manufacturer")
-    _add(identification, "value", stated.item.serial)
+    _add(identification, "value", laboratory_file.item.serial)
     laboratory = _add(parent, "calibrationLaboratory")
-    if stated.laboratory.accreditation is not None:
-        _add(laboratory, "calibrationLaboratoryCode", stated.laboratory.accreditation)
-    _add_contact(laboratory, "contact", stated.laboratory)
+    if laboratory_file.laboratory.accreditation is not None:
+        _add(laboratory, "calibrationLaboratoryCode", laboratory_file.laboratory.accreditation)
+    _add_contact(laboratory, "contact", laboratory_file.laboratory)
     persons = _add(parent, "respPersons")
-    for number, signature in enumerate(stated.signature):
+    for number, signature in enumerate(laboratory_file.signature):
         person = _add(persons, "respPerson")
         _add_text(_add(person, "person"), "name", signature.name or signature.role)
         _add(person, "role", signature.role)
         _add(person, "mainSigner", "true" if number == 0 else "false")
-    _add_contact(parent, "customer", stated.customer)
+    _add_contact(parent, "customer", laboratory_file.customer)
     statements = _add(parent, "statements")
     for statement in certificate.statements:
         _add_conformity(statements, statement, certificate.quantity(statement.quantity))
@@ -132,24 +138,23 @@ def _add_conformity(parent: Element, statement: ConformityStatement, quantity: C
     rule, risks = describe_rule(statement, quantity), describe_risks(statement)
     _add_text(element, "description", f"The item {DECISION_WORDS[statement.decision]}. {rule}. {risks}")
     _add(element, "norm", "JCGM 106:2012")
-    first, *rest = statement.decision.split()
-    _add(element, "conformity", first + "".join(word.capitalize() for word in rest))
+    _add(element, "conformity", CONFORMITY[statement.decision])
 
 
 def _add_results(parent: Element, fit: Record, certificate: Certificate) -> None:
-    stated, result = certificate.laboratory.measured, _add(parent, "measurementResult")
+    conditions, result = certificate.laboratory.measured, _add(parent, "measurementResult")
     _add_text(result, "name", fit.name)
     methods = _add(result, "usedMethods")
     for name, norm in METHODS.items():
         method = _add(methods, "usedMethod")
         _add_text(method, "name", name)
         _add(method, "norm", norm)
-    if stated.method:
-        _add_text(_add(methods, "usedMethod"), "name", stated.method)
+    if conditions.method:
+        _add_text(_add(methods, "usedMethod"), "name", conditions.method)
     if certificate.cells:
         _add_cells(_add(result, "measuringEquipments"), certificate)
-    if stated.temperature_degC is not None or stated.humidity_percent is not None:
-        _add_conditions(_add(result, "influenceConditions"), stated)
+    if conditions.temperature_degC is not None or conditions.humidity_percent is not None:
+        _add_conditions(_add(result, "influenceConditions"), conditions)
     results = _add(result, "results")
     for quantity in certificate.quantities:
         _add_result(results, quantity)
@@ -159,14 +164,16 @@ def _add_results(parent: Element, fit: Record, certificate: Certificate) -> None
 
 
 def _add_cells(parent: Element, certificate: Certificate) -> None:
-    for stated, cell in certificate.cells:
+    for entry, cell in certificate.cells:
         equipment = _add(parent, "measuringEquipment")
         _add_text(
             equipment,
             "name",
-            f"load cell at the {stated.end} end" if stated.end != "both" else "load cells of both ends",
+            f"load cell at the {entry.end} end" if entry.end != "both" else "load cells of both ends",
         )
-        words = f"{stated.cell}: certificate {cell.number} of {cell.issued_by}, {cell.issued}; relative expanded uncertainty"
+        words = (
+            f"{entry.cell}: certificate {cell.number} of {cell.issued_by}, {cell.issued}; relative expanded uncertainty"
+        )
         _add_text(
             equipment,
             "description",
@@ -174,10 +181,10 @@ def _add_cells(parent: Element, certificate: Certificate) -> None:
         )
 
 
-def _add_conditions(parent: Element, stated: MeasuringConditions) -> None:
+def _add_conditions(parent: Element, conditions: MeasuringConditions) -> None:
     for name, ends, unit in (
-        ("temperature", stated.temperature_degC, CELSIUS),
-        ("humidityRelative", stated.humidity_percent, PERCENT),
+        ("temperature", conditions.temperature_degC, CELSIUS),
+        ("humidityRelative", conditions.humidity_percent, PERCENT),
     ):
         if ends is None:
             continue
@@ -200,8 +207,8 @@ def _add_result(parent: Element, quantity: CertifiedQuantity) -> None:
     _add_text(value, "name", quantity.meaning)
     real = _add_real(value, factor * quantity.value, unit)
     expanded = SubElement(real, f"{{{SI}}}expandedUnc")
-    stated = (factor * quantity.expanded, quantity.factor, quantity.probability)
-    for key, number in zip(("uncertainty", "coverageFactor", "coverageProbability"), stated, strict=True):
+    numbers = (factor * quantity.expanded, quantity.factor, quantity.probability)
+    for key, number in zip(("uncertainty", "coverageFactor", "coverageProbability"), numbers, strict=True):
         SubElement(expanded, f"{{{SI}}}{key}").text = f"{number:.6g}"
     if math.isfinite(quantity.degrees):
         degrees = _add(data, "quantity")

@@ -78,13 +78,13 @@ class CellCertificate(Frozen):
 
     @model_validator(mode="after")
     def _complete(self) -> "CellCertificate":
-        stated = {name: getattr(self, name) for name in ("number", "issued", "issued_by", "expanded_uncertainty")}
-        missing = [name for name, value in stated.items() if value is None]
+        fields = {name: getattr(self, name) for name in ("number", "issued", "issued_by", "expanded_uncertainty")}
+        missing = [name for name, value in fields.items() if value is None]
         if self.dcc is None and missing:
             raise ValueError(
                 f"write {missing[0]} of the certificate too (uncertainties relative, 0.0024 for 0.24 %), or its dcc"
             )
-        if self.dcc is not None and len(missing) < len(stated):
+        if self.dcc is not None and len(missing) < len(fields):
             raise ValueError(
                 "dcc names a file that says the rest; leave number, issued, issued_by and expanded_uncertainty out"
             )
@@ -119,24 +119,25 @@ class StatedLimit(Frozen):
     """Limits of a quantity, and the rule by which conformity is decided."""
 
     quantity: Name
-    at_least: Finite = -math.inf
-    at_most: Finite = math.inf
+    at_least: Finite | None = None
+    at_most: Finite | None = None
     guard_band: NonNegative = 1.0
     source: Text = ""
     production: Production | None = None
 
     @model_validator(mode="after")
     def _limited(self) -> "StatedLimit":
-        if math.isinf(self.at_least) and math.isinf(self.at_most):
+        if self.at_least is None and self.at_most is None:
             raise ValueError("write at_most, at_least or both")
-        if self.at_least >= self.at_most:
-            raise ValueError(f"at_least = {self.at_least:g} must be below at_most = {self.at_most:g}")
+        if self.tolerance.lower >= self.tolerance.upper:
+            raise ValueError(f"at_least = {self.at_least} must be below at_most = {self.at_most}")
         return self
 
     @property
     def tolerance(self) -> ToleranceInterval:
         """The limits as an interval."""
-        return ToleranceInterval(self.at_least, self.at_most)
+        lower = -math.inf if self.at_least is None else self.at_least
+        return ToleranceInterval(lower, math.inf if self.at_most is None else self.at_most)
 
 
 class Signature(Frozen):

@@ -47,8 +47,8 @@ def certificate_page(fit: Record, certificate: Certificate) -> HtmlPage:
         fit: The fit.
         certificate: Its certificate.
     """
-    stated = certificate.laboratory
-    signatures = [(signature.name or "Name and signature", signature.role) for signature in stated.signature]
+    lab = certificate.laboratory
+    signatures = [(signature.name or "Name and signature", signature.role) for signature in lab.signature]
     sections = [
         _parties_section(certificate),
         _results_section(certificate),
@@ -57,14 +57,10 @@ def certificate_page(fit: Record, certificate: Certificate) -> HtmlPage:
         _measured_section(fit, certificate),
         _cells_section(certificate),
         _provenance_section(fit, certificate),
-        _section(
-            "Signatures", signatures=[(f"{stated.laboratory.city}, {stated.issued}", "Place and date"), *signatures]
-        ),
+        _section("Signatures", signatures=[(f"{lab.laboratory.city}, {lab.issued}", "Place and date"), *signatures]),
     ]
-    subtitle = (
-        f"{stated.item.name}, serial number {stated.item.serial}; issued {stated.issued} by {stated.laboratory.name}"
-    )
-    title = f"Calibration certificate {stated.number}"
+    subtitle = f"{lab.item.name}, serial number {lab.item.serial}; issued {lab.issued} by {lab.laboratory.name}"
+    title = f"Calibration certificate {lab.number}"
     return HtmlPage(title, subtitle, tuple(section for section in sections if section is not None))
 
 
@@ -85,12 +81,12 @@ def _section(
 
 
 def _parties_section(certificate: Certificate) -> PageSection:
-    stated = certificate.laboratory
-    item = [stated.item.name, f"serial number {stated.item.serial}", stated.item.manufacturer, stated.item.model]
+    lab = certificate.laboratory
+    item = [lab.item.name, f"serial number {lab.item.serial}", lab.item.manufacturer, lab.item.model]
     facts = [
         ("Item", ", ".join(filter(None, item))),
-        ("Laboratory", _describe_party(stated.laboratory)),
-        ("Customer", _describe_party(stated.customer)),
+        ("Laboratory", _describe_party(lab.laboratory)),
+        ("Customer", _describe_party(lab.customer)),
     ]
     return _section("Item, laboratory, customer", facts=facts)
 
@@ -167,7 +163,7 @@ def _two_digits(number: float) -> str:
 
 
 def _measured_section(fit: Record, certificate: Certificate) -> PageSection:
-    stated, description, tables = (
+    conditions, description, tables = (
         certificate.laboratory.measured,
         fit.dataset.description,
         fit.dataset.measurements.tables,
@@ -180,9 +176,9 @@ def _measured_section(fit: Record, certificate: Certificate) -> PageSection:
     lengths = _range_of(tables, "route", description.route.unit if description.route is not None else "")
     loads = _range_of(tables, "input_force", "N") or _range_of(tables, "load", "N")
     period = (
-        stated.begin.isoformat()
-        if stated.begin == stated.end
-        else f"{stated.begin.isoformat()} to {stated.end.isoformat()}"
+        conditions.begin.isoformat()
+        if conditions.begin == conditions.end
+        else f"{conditions.begin.isoformat()} to {conditions.end.isoformat()}"
     )
     rows = [
         ("Data set", f"{fit.name}. {section.context['sentences'][0]}"),
@@ -190,11 +186,11 @@ def _measured_section(fit: Record, certificate: Certificate) -> PageSection:
         ("Mountings", f"{listed(counts)}, each a mounting of its own" if counts else ""),
         ("Lengths", lengths),
         ("Loads at the input", loads),
-        ("Bench", stated.bench),
-        ("Method", stated.method),
-        ("Measured", period + (f", {stated.operator}" if stated.operator is not None else "")),
-        ("Air temperature", _describe_range(stated.temperature_degC, "°C")),
-        ("Relative humidity", _describe_range(stated.humidity_percent, "%")),
+        ("Bench", conditions.bench),
+        ("Method", conditions.method),
+        ("Measured", period + (f", {conditions.operator}" if conditions.operator is not None else "")),
+        ("Air temperature", _describe_range(conditions.temperature_degC, "°C")),
+        ("Relative humidity", _describe_range(conditions.humidity_percent, "%")),
     ]
     return _section("What was measured, and how", facts=rows)
 
@@ -217,10 +213,10 @@ def _range_of(tables: tuple[object, ...], name: str, unit: str) -> str:
 def _cells_section(certificate: Certificate) -> PageSection:
     heads = ("load cell", "end", "certificate", "issued", "by", "U, relative", "k")
     rows = []
-    for stated, cell in certificate.cells:
+    for entry, cell in certificate.cells:
         expanded = f"{100 * cell.gain_error_sd * cell.coverage_factor:.2g} %"
         rows.append(
-            (stated.cell, stated.end, cell.number, cell.issued, cell.issued_by, expanded, f"{cell.coverage_factor:g}")
+            (entry.cell, entry.end, cell.number, cell.issued, cell.issued_by, expanded, f"{cell.coverage_factor:g}")
         )
     tables = [PageTable(heads, tuple(rows), left=(0, 1, 4))] if rows else []
     return _section("Traceability", tables, notes=() if rows else [_UNTRACED])

@@ -75,8 +75,8 @@ def test_uncertainties_are_those_of_the_draws_with_the_errors_of_the_bench(quick
         assert quantity.standard == pytest.approx(expected, rel=5 / math.sqrt(2 * n) + 0.02)
         assert abs(quantity.value - row.readings.mean) < 5 * quantity.standard / math.sqrt(n)
         assert quantity.factor * quantity.standard == pytest.approx((quantity.interval[1] - quantity.interval[0]) / 2)
-        stated = {c.name: c.standard for c in quantity.budget if c.evaluation == "B"}
-        assert stated == {source.words: row.shifts[source.name] for source in budget.sources}
+        shifts = {c.name: c.standard for c in quantity.budget if c.evaluation == "B"}
+        assert shifts == {source.words: row.shifts[source.name] for source in budget.sources}
 
 
 def test_a_wider_coverage_probability_widens_the_interval_alone(quick_fit, certificate):
@@ -138,8 +138,8 @@ def test_the_xml_states_what_the_page_states(quick_fit, certificate):
         real = result.find("dcc:data/dcc:quantity[@refType='basic_measuredValue']/si:real", NAMES)
         assert float(real.findtext("si:value", "", NAMES)) == pytest.approx(quantity.value, rel=1e-8)
         assert real.findtext("si:unit", "", NAMES) == (r"\milli\metre" if quantity.unit == "mm" else r"\one")
-        stated = [float(element.text) for element in real.find("si:expandedUnc", NAMES)]
-        assert stated == pytest.approx([quantity.expanded, quantity.factor, 0.95], rel=1e-5)
+        numbers = [float(element.text) for element in real.find("si:expandedUnc", NAMES)]
+        assert numbers == pytest.approx([quantity.expanded, quantity.factor, 0.95], rel=1e-5)
     assert [element.text for element in root.iterfind(".//dcc:conformity", NAMES)] == ["pass", "pass"]
     conditional = tuple(replace(statement, decision="conditional fail") for statement in certificate.statements)
     other = ElementTree.fromstring(certificate_xml(quick_fit, replace(certificate, statements=conditional)))
@@ -220,8 +220,8 @@ def test_a_cell_may_be_named_by_its_digital_certificate(quick_fit, write, tmp_pa
     start, end = TEXT.index("number = \"K-2026-0815\""), TEXT.index("[[limit]]")
     path = write((TEXT[start:end], 'dcc = "cell.xml"\n\n'))
     shutil.copy(LABORATORY.with_name("cell.xml"), tmp_path)
-    ((stated, cell),) = certify(quick_fit, path).cells
-    assert (stated.cell, cell.number, cell.issued_by) == (
+    ((entry, cell),) = certify(quick_fit, path).cells
+    assert (entry.cell, cell.number, cell.issued_by) == (
         "S-beam 500 N, serial numbers 4711 and 4712", "K-2026-0815", "Example force laboratory"
     )  # fmt: skip
 

@@ -51,11 +51,11 @@ def test_what_is_printed_is_read_by_a_fit(accept, tmp_path):
     contact = '[[contact]]\nname = "sheath"\nfriction = "mu"\nwrap_angle = { value = 180, unit = "deg" }\n'
     tables = '[tables]\nforces = { file = "forces.csv" }\n'
     lines = [accept("cell", EXAMPLE, "--end", end) for end in ("input", "output")]
-    sensors = lines[0] + lines[1].removeprefix("[sensors]\n")
-    (tmp_path / "cable.toml").write_text(f'schema = 1\nname = "x"\n{contact}{tables}{sensors}')
-    stated = bf.read(tmp_path).description.sensors
-    assert (stated.input_gain_error_sd, stated.output_gain_error_sd) == (0.0012, 0.0012)
-    assert stated.input_ratio == pytest.approx(1 / 1.002, abs=1e-6)
+    settings = lines[0] + lines[1].removeprefix("[sensors]\n")
+    (tmp_path / "cable.toml").write_text(f'schema = 1\nname = "x"\n{contact}{tables}{settings}')
+    sensors = bf.read(tmp_path).description.sensors
+    assert (sensors.input_gain_error_sd, sensors.output_gain_error_sd) == (0.0012, 0.0012)
+    assert sensors.input_ratio == pytest.approx(1 / 1.002, abs=1e-6)
 
 
 def test_errors_in_place_of_shown_forces_say_the_same(write):

@@ -191,17 +191,11 @@ def certify(fit: Record, laboratory_file: str | Path, probability: float = 0.95)
     return Certificate(laboratory, quantities, statements, cells, tuple(remarks))
 
 
-def _shifts(fit: Record, name: str) -> dict[str, float]:
-    """Return the standard uncertainty that each error of the bench adds to a quantity, in its unit."""
-    budget = error_budget(fit)
-    row = budget.row(name) if budget else None
-    return dict(row.shifts) if row else {}
-
-
 def _propagate_answer(fit: Record, name: str, values: Vector) -> tuple[Vector, tuple[UncertaintyComponent, ...]]:
     """Return draws of a quantity with the errors of the bench, and its budget."""
-    shifts, budget = _shifts(fit, name), error_budget(fit)
-    words = {source.name: source.words for source in budget.sources} if budget else {}
+    budget = error_budget(fit)
+    row, words = (None, {}) if budget is None else (budget.row(name), {s.name: s.words for s in budget.sources})
+    shifts = {} if row is None else row.shifts
     readings = UncertaintyComponent("readings (posterior)", "A", *fit_t_distribution(values))
     bench = (UncertaintyComponent(words[source], "B", shift, np.inf) for source, shift in shifts.items())
     return propagate(values, shifts, fit.provenance.seed), (readings, *bench)

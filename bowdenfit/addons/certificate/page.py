@@ -223,10 +223,11 @@ def _cells_section(certificate: Certificate) -> PageSection:
 
 
 def _provenance_section(fit: Record, certificate: Certificate) -> PageSection:
-    made = fit.provenance
+    made, names = fit.provenance, {quantity.name for quantity in certificate.quantities}
     facts = [
         ("Computed by", ", ".join(f"{name} {version}" for name, version in made.versions.items())),
         ("Seed", f"{made.seed}; the same files, versions and seed give the same numbers"),
+        ("Priors", "; ".join(f"{p.name} {p.prior_text}" for p in fit.model.space.free if p.name in names)),
         *((name, f"SHA-256 {digest}") for name, digest in fit.dataset.sha256.items()),
     ]
     note = (

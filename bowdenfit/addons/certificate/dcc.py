@@ -144,6 +144,9 @@ def _add_conformity(parent: Element, statement: ConformityStatement, quantity: C
 def _add_results(parent: Element, fit: Record, certificate: Certificate) -> None:
     conditions, result = certificate.laboratory.measured, _add(parent, "measurementResult")
     _add_text(result, "name", fit.name)
+    setup = [conditions.bench, f"Operator: {conditions.operator}" if conditions.operator is not None else ""]
+    if any(setup):
+        _add_text(result, "description", "; ".join(filter(None, setup)))
     methods = _add(result, "usedMethods")
     for name, norm in METHODS.items():
         method = _add(methods, "usedMethod")

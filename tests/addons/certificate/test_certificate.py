@@ -36,7 +36,7 @@ ORDER = {
     "usedMethod": "name norm",
     "measuringEquipment": "name description",
     "influenceCondition": "name data",
-    "measurementResult": "name usedMethods measuringEquipments influenceConditions results measurementMetaData",
+    "measurementResult": "name description usedMethods measuringEquipments influenceConditions results measurementMetaData",
     "result": "name description data",
     "quantity": "name real",
     "real": "value unit expandedUnc",
@@ -277,7 +277,8 @@ def test_names_stay_text_in_page_and_xml(quick_fit, write, tmp_path):
     bf.certificate(quick_fit, path, tmp_path / "out")
     page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
     assert "<script" not in page and "\u202e" not in page and "</dd>Motor" not in page
-    ElementTree.parse(tmp_path / "out" / "certificate.xml")
+    text = " ".join(ElementTree.parse(tmp_path / "out" / "certificate.xml").getroot().itertext())
+    assert "\\x01\\u202e</dd>Motor" in text and odd[:-1] in text
 
 
 def test_quantities_that_readings_do_not_determine_are_left_out(quick_fit, monkeypatch):

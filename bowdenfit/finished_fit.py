@@ -15,7 +15,7 @@ from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.questions.check.words import check_sentences
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.words import comparison_blocks
-from bowdenfit.questions.error_budget import ErrorBudget, error_budget, with_bench_errors
+from bowdenfit.questions.error_budget import ErrorBudget, error_budget, find_optimal_length
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,
@@ -119,7 +119,7 @@ class Fit(Record):
         Raises:
             UsageError: The description has no route to vary, or there is no posterior.
         """
-        return with_bench_errors(super().optimal_length(), self.error_budget)
+        return find_optimal_length(self)
 
     def correlation(self) -> "DataFrame":
         """Return the correlations of the draws of all parameters, as a square table.

@@ -310,8 +310,13 @@ def answer_interval(fit: Record, quantity: str) -> Interval:
     return row.bench if row is not None else fit.parameter(quantity)
 
 
-def with_bench_errors(best: OptimalLength, budget: ErrorBudget | None) -> OptimalLength:
-    """Return the best length and its efficiency with intervals that include the errors of the bench."""
+def find_optimal_length(fit: Record) -> OptimalLength:
+    """Return the best length and its efficiency with intervals that include the errors of the bench.
+
+    Raises:
+        UsageError: The description has no route to vary, or there is no posterior.
+    """
+    best, budget = Record.optimal_length(fit), error_budget(fit)
     rows = {} if budget is None else {row.quantity: row.bench for row in budget.rows}
     length, efficiency = rows.get(OPTIMAL_LENGTH, best.length), rows.get(OPTIMAL_EFFICIENCY, best.efficiency)
     return replace(best, length=length, efficiency=efficiency)

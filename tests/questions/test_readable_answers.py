@@ -156,6 +156,7 @@ def test_the_figure_of_the_priors_can_be_read(name):
 def test_no_figure_of_an_answer_is_left_out():
     looked_at = {f"{name}_figure" for names, _ in ANSWERS.values() for name in names} | {"prior_figure"}
     looked_at |= {"compensation_figure", "compensation_traces_figure", "teleoperation_figure"}  # beside their fits
+    looked_at |= {"metabolic_figure"}  # beside its study
     assert looked_at | {f"{name}_figure" for name in FIGURES} == set(FILES)
 
 

@@ -24,6 +24,7 @@ from bowdenfit.questions.compare.common_readings import (
     choose_parts,
     find_common_readings,
 )
+from bowdenfit.questions.error_budget import find_optimal_length
 from bowdenfit.questions.recorded.friction_effects import RateEffect, compare_speeds
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, assess_fit
 from bowdenfit.results.record import Draws, Record
@@ -209,7 +210,7 @@ def _compare_fits(fits: Mapping[str, Record], report: Report | None, leave_out: 
         _describe_fits(ordered),
         _compare_parameters(ordered),
         {
-            n: (f.optimal_length().length, f.dataset.description.route.unit)
+            n: (find_optimal_length(f).length, f.dataset.description.route.unit)
             for n, f in ordered.items()
             if f.dataset.description.route
         },

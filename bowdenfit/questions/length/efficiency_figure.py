@@ -91,6 +91,8 @@ class EfficiencyAlongRoute:
 
 def data(fit: Record) -> EfficiencyAlongRoute | None:
     """Return efficiency along the route and its optimum; None without a route."""
+    from bowdenfit.questions.error_budget import find_optimal_length  # here, because drawing again needs no JAX
+
     route, posterior = fit.dataset.description.route, fit.sampled
     if route is None:
         return None
@@ -104,7 +106,7 @@ def data(fit: Record) -> EfficiencyAlongRoute | None:
         return shown
     mounted = length.compute_new_run_interval(fit) if any(p.of_runs for p in points) else None
     return replace(
-        shown, optimum=fit.optimal_length(), optimal_length=length.collect_optimal_lengths(fit), new_run=mounted
+        shown, optimum=find_optimal_length(fit), optimal_length=length.collect_optimal_lengths(fit), new_run=mounted
     )
 
 

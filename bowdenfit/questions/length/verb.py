@@ -22,7 +22,11 @@ def length(fit: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
     Raises:
         UsageError: The description has no route to vary, or there is no posterior.
     """
-    return fit.optimal_length()
+    from bowdenfit.questions.error_budget import (
+        find_optimal_length,  # here, because an answer that is kept needs no JAX
+    )
+
+    return find_optimal_length(fit)
 
 
 def _reply(answer: "OptimalLength", _: object) -> Reply:

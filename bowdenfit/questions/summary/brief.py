@@ -15,7 +15,7 @@ from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.data_set_words import describe_assumed_decimals
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
-from bowdenfit.questions.error_budget import KEY_ROLES, answer_interval, widening_sentence
+from bowdenfit.questions.error_budget import KEY_ROLES, answer_interval, find_optimal_length, widening_sentence
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
@@ -209,7 +209,7 @@ def key_quantities(fit: Record) -> list[KeyQuantity]:
 def summary_sentences(fit: Record, purpose: Purpose = "design") -> list[str]:
     """Return the answer in sentences: the first says what to do, or what the coefficients are."""
     if fit.sampled is not None and fit.dataset.description.route is not None:
-        best = fit.optimal_length()
+        best = find_optimal_length(fit)
         if purpose == "coefficients":
             return [_coefficient_sentence(fit), *_loss_sentence(fit), *_option_sentences(fit), best.headline]
         return [best.headline, *best.sentences(), *_loss_sentence(fit), *_option_sentences(fit)]

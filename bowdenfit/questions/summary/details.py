@@ -14,7 +14,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.error_budget import budget_text
+from bowdenfit.questions.error_budget import budget_text, find_optimal_length
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
@@ -269,7 +269,7 @@ def _design_answer(fit: Record) -> str:
     """Return the best length; empty without a route or draws."""
     if fit.sampled is None or fit.dataset.description.route is None:
         return ""
-    return str(fit.optimal_length())
+    return str(find_optimal_length(fit))
 
 
 def _origin_sentence(page: dict[str, Any]) -> str:

@@ -16,7 +16,7 @@ from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.answer import check_readings
-from bowdenfit.questions.error_budget import error_budget
+from bowdenfit.questions.error_budget import error_budget, find_optimal_length
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss import loss_by_contact
@@ -103,7 +103,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         if fit.posterior.agreement is not None:
             page["samplers"] = fit.posterior.agreement
         if fit.dataset.description.route is not None:
-            page["optimal"] = fit.optimal_length()
+            page["optimal"] = find_optimal_length(fit)
     everything: dict[str, Any] = plain_data(page)
     return everything
 

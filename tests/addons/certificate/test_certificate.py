@@ -4,11 +4,13 @@ import math
 import os
 import shutil
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from exchanged_texts import write_exchanged
 from offline_browser import browser, opened
 
 import bowdenfit as bf
@@ -52,17 +54,7 @@ def certificate(quick_fit):
 @pytest.fixture
 def write(tmp_path):
     """Write laboratory.toml with some texts exchanged."""
-
-    def call(*exchanged):
-        text = TEXT
-        for old, new in exchanged:
-            assert old in text, old
-            text = text.replace(old, new)
-        path = tmp_path / "laboratory.toml"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return call
+    return partial(write_exchanged, tmp_path / "laboratory.toml", TEXT)
 
 
 def test_uncertainties_are_those_of_the_draws_with_the_errors_of_the_bench(quick_fit, certificate):

@@ -2,10 +2,12 @@
 
 import os
 import random
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from exchanged_texts import write_exchanged
 
 import bowdenfit as bf
 from bowdenfit.addons.certificate.calibrated_cell import read_load_cell
@@ -20,17 +22,7 @@ UNCERTAIN = "0.00020 0.00024 0.00040 0.00060 0.00080 0.00100"
 @pytest.fixture
 def write(tmp_path):
     """Write the example with some texts exchanged."""
-
-    def call(*exchanged):
-        text = TEXT
-        for old, new in exchanged:
-            assert old in text, old
-            text = text.replace(old, new)
-        path = tmp_path / "cell.xml"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return call
+    return partial(write_exchanged, tmp_path / "cell.xml", TEXT)
 
 
 def test_the_example_says_gain_uncertainty_and_who_found_them(accept):

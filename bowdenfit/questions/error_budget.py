@@ -154,7 +154,7 @@ def error_budget(fit: Record) -> ErrorBudget | None:
             for source, steps in uncertainties
         }
         readings = Interval.of(draws)
-        bench = _widened(readings, list(shifts.values()), _limits(fit, name, readings))
+        bench = _widened(readings, list(shifts.values()), answer_limits(fit, name, readings))
         rows.append(BudgetRow(name, unit, readings, bench, shifts))
     return ErrorBudget(tuple(source for source, _ in uncertainties), tuple(rows))
 
@@ -250,7 +250,7 @@ def _with_constant_angles(data: Any, cable: Cable, error: BenchError) -> Any:
     return replace(data, angles=replace(angles, own=own_angles, is_own=is_own))
 
 
-def _limits(fit: Record, name: str, readings: Interval) -> tuple[float, float]:
+def answer_limits(fit: Record, name: str, readings: Interval) -> tuple[float, float]:
     """Return the limits of a quantity: the range of a route, 0 and 1 of an efficiency, 0 of what is never negative."""
     route = fit.dataset.description.route
     if name == OPTIMAL_LENGTH and route is not None:

@@ -27,12 +27,14 @@ from bowdenfit.addons.certificate.uncertainty import (
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import BowdenfitError, UsageError, suggest_name
-from bowdenfit.questions.error_budget import error_budget, list_answers
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.error_budget import answer_limits, error_budget, list_answers
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 from bowdenfit.types import Vector
 from bowdenfit.words import decimals
 
+_FAR_OFF = 2.0  # standard uncertainties by which an uncorrected gain may differ, those of an expanded one (GUM 6.2)
 _SAME = 1.05  # factor by which a stated uncertainty may be rounded down; a judgement
 MEANINGS = {OPTIMAL_LENGTH: "length of highest efficiency", OPTIMAL_EFFICIENCY: "efficiency at that length"}
 
@@ -175,7 +177,9 @@ def certify(fit: Record, laboratory_file: str | Path, probability: float = 0.95)
     propagated = {name: _propagate_answer(fit, name, values) for name, (_, values) in answers.items()}
     meanings = {p.name: p.meaning for p in fit.model.space.free} | MEANINGS
     quantities = tuple(
-        _certify_quantity(name, meanings[name], unit, values, propagated[name], probability)
+        _certify_quantity(
+            name, meanings[name], unit, propagated[name], probability, answer_limits(fit, name, Interval.of(values))
+        )
         for name, (unit, values) in answers.items()
     )
     statements = tuple(_judge(limit, quantities, propagated) for limit in laboratory.limit)
@@ -205,14 +209,14 @@ def _certify_quantity(
     name: str,
     meaning: str,
     unit: str,
-    readings: Vector,
     propagated: tuple[Vector, tuple[UncertaintyComponent, ...]],
     probability: float,
+    limits: tuple[float, float],
 ) -> CertifiedQuantity:
-    """Return a result; the interval of a quantity that is never negative ends at 0 at the lowest."""
+    """Return a result, whose interval is cut off at the limits of the quantity."""
     draws, budget = propagated
     low, high = symmetric_interval(draws, probability)
-    low = max(low, 0.0) if np.min(readings) >= 0 else low
+    low, high = max(low, limits[0]), min(high, limits[1])
     return CertifiedQuantity(
         name, meaning, unit, float(np.mean(draws)), float(np.std(draws)), (low, high), probability, budget
     )
@@ -230,9 +234,10 @@ def _judge(
     """
     quantity = next((quantity for quantity in quantities if quantity.name == limit.quantity), None)
     if quantity is None:
-        known = suggest_name(limit.quantity, [quantity.name for quantity in quantities])
+        names = [quantity.name for quantity in quantities]
         raise UsageError(
-            f"a [[limit]] of laboratory.toml is for {limit.quantity!r}, which this certificate does not state{known}"
+            f"a [[limit]] of laboratory.toml is for {limit.quantity!r}, which this certificate does not "
+            f"state{suggest_name(limit.quantity, names)}"
         )
     guard_band = limit.guard_band * quantity.expanded
     acceptance = refuse_empty_acceptance(quantity.name, limit.tolerance, guard_band)
@@ -249,7 +254,7 @@ def _judge(
 
 
 def _refuse_understated_cells(fit: Record, cells: Sequence[tuple[CellCertificate, CalibratedCell]]) -> None:
-    """Refuse a certificate whose load cells are known less well than the fit assumed.
+    """Refuse a certificate whose load cells are known less well than the fit assumed, or whose gains it did not correct.
 
     Raises:
         UsageError: One is.
@@ -265,4 +270,11 @@ def _refuse_understated_cells(fit: Record, cells: Sequence[tuple[CellCertificate
                     f"{cell.gain_error_sd:.3g}, and the fit assumed {assumed:.3g}, so that its results would be too "
                     f"certain; write {end}_gain_error_sd = {cell.gain_error_sd:.3g} under [sensors] of cable.toml, and "
                     "fit again."
+                )
+            left = cell.gain * getattr(sensors, f"{end}_ratio") - 1
+            if entry.dcc is not None and abs(left) > _FAR_OFF * assumed:
+                raise UsageError(
+                    f"certificate {cell.number} says that the {end} load cell shows {cell.gain:.4g} of the true force, and the "
+                    f"fit left {100 * left:.2g} % of that uncorrected, more than its gain error of {assumed:.3g} allows; write "
+                    f"{end}_ratio = {1 / cell.gain:.6g} under [sensors] of cable.toml, and fit again."
                 )

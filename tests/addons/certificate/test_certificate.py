@@ -219,6 +219,22 @@ def test_a_cell_may_be_named_by_its_digital_certificate(quick_fit, write, tmp_pa
     )  # fmt: skip
 
 
+def test_a_gain_that_its_certificate_shows_and_the_fit_did_not_correct_is_refused(quick_fit, write, tmp_path):
+    """Every force is shown 5 % too large; stated as a ratio of the cells, it is accepted."""
+    start, end = TEXT.index("number = \"K-2026-0815\""), TEXT.index("[[limit]]")
+    path = write((TEXT[start:end], 'dcc = "cell.xml"\n\n'))
+    forces = "0.0501 0.1002 0.2004 0.3006 0.4008 0.5010"
+    too_large = " ".join(f"{1.05 * float(force) / 1.002:.5f}" for force in forces.split())
+    example = LABORATORY.with_name("cell.xml").read_text(encoding="utf-8")
+    write_exchanged(tmp_path / "cell.xml", example, (forces, too_large))
+    with pytest.raises(UsageError, match="shows 1.05 of the true force, and the fit left 5 % of that.*_ratio = 0.952381"):
+        certify(quick_fit, path)
+    description = quick_fit.dataset.description
+    sensors = description.sensors.model_copy(update={"input_ratio": 1 / 1.05, "output_ratio": 1 / 1.05})
+    corrected = replace(quick_fit.dataset, description=description.model_copy(update={"sensors": sensors}))
+    assert certify(replace(quick_fit, dataset=corrected), path).cells[0][1].gain == pytest.approx(1.05, rel=1e-4)
+
+
 def test_without_certificates_of_cells_the_page_says_that_nothing_is_traceable(quick_fit, write, tmp_path):
     start, end = TEXT.index("[[cell]]"), TEXT.index("[[limit]]")
     bf.certificate(quick_fit, write((TEXT[start:end], "")), tmp_path / "out")

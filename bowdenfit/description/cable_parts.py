@@ -92,8 +92,8 @@ class WrapAngle(Frozen):
         return self
 
     def _checked_route(self) -> "WrapAngle":
-        others = (self.curve, self.column, self.departure, self.published_range, self.nominal, self.value, self.unit, self.sd)
-        if any(other is not None for other in others):
+        sources = (self.curve, self.column, self.departure, self.published_range, self.nominal, self.value, self.unit, self.sd)
+        if any(source is not None for source in sources):
             raise ValueError("route gives the wrap angle; beside it only path and error may be written")
         if self.error is not None and (self.error.value < 0 or self.error.sd is not None):
             raise ValueError('error is the standard deviation of each coordinate, such as { value = 1, unit = "mm" }')

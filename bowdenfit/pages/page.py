@@ -96,7 +96,6 @@ def _image_tag(png: bytes, title: str) -> str:
     return f'<img class="{kind}" width="{width}" height="{height}" alt="{alt}" src="data:image/png;base64,{content}">'
 
 
-
 def _assemble(page: HtmlPage) -> str:
     """The page with marks about the places of its drawings, one after the other."""
     environment = _make_environment()

@@ -243,7 +243,7 @@ class Record(Display):
         return at
 
     def optimal_length(self) -> OptimalLength:
-        """Return the best length, how certain it is, and what the choices cost.
+        """Return the best length, how certain it is by the readings alone, and what the choices cost.
 
         Raises:
             UsageError: The description has no route to vary, or there is no posterior.

@@ -22,9 +22,7 @@ def length(fit: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
     Raises:
         UsageError: The description has no route to vary, or there is no posterior.
     """
-    from bowdenfit.questions.error_budget import (
-        find_optimal_length,  # here, because an answer that is kept needs no JAX
-    )
+    from bowdenfit.questions.error_budget import find_optimal_length  # here, as a kept answer needs no JAX
 
     return find_optimal_length(fit)
 

@@ -138,4 +138,3 @@ def write_report(
 def _load_earlier(earlier: Record | str | Path) -> tuple[Record, str]:
     """Return an earlier fit and its name."""
     return (load(Path(earlier)), str(earlier)) if isinstance(earlier, str | Path) else (earlier, earlier.name)
-

@@ -226,21 +226,21 @@ def _contrast_sentences(answer: Teleoperation) -> Iterator[str]:
 
 def _measured_sentences(answer: Teleoperation) -> Iterator[str]:
     """Say what was measured at a wall, and whether the intervals of the coupling as stated agree."""
-    contact, stated = answer.measured, answer.stated
+    contact, scheme = answer.measured, answer.stated
     if contact is None:
         return
     parts = []
     if contact.free_torque is not None:
-        parts.append(_compare(contact.free_torque, stated.free_torque, "N*m in free motion"))
-    if stated.stiffness is not None:
-        parts.append(_compare(contact.stiffness, stated.stiffness, "N*m/rad in contact"))
+        parts.append(_compare(contact.free_torque, scheme.free_torque, "N*m in free motion"))
+    if scheme.stiffness is not None:
+        parts.append(_compare(contact.stiffness, scheme.stiffness, "N*m/rad in contact"))
     else:
         parts.append(f"{significant(contact.stiffness.value)} N*m/rad in contact, where the fit gives none")
     yield (
         f"Measured, {contact.file}: {'; '.join(parts)}. The slave met a wall of {significant(contact.wall.value)} N*m/rad; "
         f"{answer.wall:.4g} N*m/rad are stated."
     )
-    if stated.stiffness is not None and contact.stiffness.compare(stated.stiffness) == "below":
+    if scheme.stiffness is not None and contact.stiffness.compare(scheme.stiffness) == "below":
         yield (
             "Where one side of the loop goes slack, its stiffness is half; if the measured one is too low for that reason, "
             "record a touch with less torque."

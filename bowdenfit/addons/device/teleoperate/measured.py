@@ -10,7 +10,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, find_columns
 from bowdenfit.files.headings import Quantity
 from bowdenfit.files.tables import read_table
-from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.interval import NORMAL_90, Interval
 
 COLUMNS = ("time", "master_angle", "master_torque", "slave_angle", "slave_torque")
 _QUANTITIES = tuple(
@@ -22,7 +22,6 @@ _QUANTITIES = tuple(
 _IN_CONTACT = 0.1  # of the largest torque of the slave, from which it counts as in contact; a judgement
 _LEAST_ROWS = 20  # in contact, and in free motion; a judgement
 _BLOCKS = 8  # of successive rows, whose slopes tell the error; a judgement
-_NINETY = 1.645  # standard deviations, of a 90 % interval
 
 
 @dataclass(frozen=True)
@@ -39,9 +38,9 @@ class MeasuredValue:
 
     def compare(self, interval: Interval) -> str:
         """Return whether it agrees with the 90 % interval of a fit: "agrees", "above" or "below"."""
-        if self.value - _NINETY * self.error > interval.q95:
+        if self.value - NORMAL_90 * self.error > interval.q95:
             return "above"
-        return "below" if self.value + _NINETY * self.error < interval.q05 else "agrees"
+        return "below" if self.value + NORMAL_90 * self.error < interval.q05 else "agrees"
 
 
 @dataclass(frozen=True)

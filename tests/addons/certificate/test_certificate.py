@@ -227,7 +227,7 @@ def test_a_gain_that_its_certificate_shows_and_the_fit_did_not_correct_is_refuse
     too_large = " ".join(f"{1.05 * float(force) / 1.002:.5f}" for force in forces.split())
     example = LABORATORY.with_name("cell.xml").read_text(encoding="utf-8")
     write_exchanged(tmp_path / "cell.xml", example, (forces, too_large))
-    with pytest.raises(UsageError, match="shows 1.05 of the true force, and the fit left 5 % of that.*_ratio = 0.952381"):
+    with pytest.raises(UsageError, match=r"shows 1\.05 of the true force, and the fit left 5 % of that.*_ratio = 0\.952381"):
         certify(quick_fit, path)
     description = quick_fit.dataset.description
     sensors = description.sensors.model_copy(update={"input_ratio": 1 / 1.05, "output_ratio": 1 / 1.05})

@@ -24,7 +24,7 @@ def python_command(function: str, *arguments: str) -> list[str]:
     Folders that this process imports from, and Python does not know by itself, come last there.
 
     Args:
-        function: Module and name of the function, such as "bowdenfit.files.apart:serve".
+        function: Module and name of the function, such as "bowdenfit.files.isolation:serve".
         arguments: Its arguments.
     """
     module, _, name = function.partition(":")

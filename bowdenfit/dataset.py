@@ -16,8 +16,8 @@ from bowdenfit.description.file import override
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, Faults
 from bowdenfit.files import is_ros2_folder
-from bowdenfit.files.apart import limits_times
 from bowdenfit.files.headings import parse_sources
+from bowdenfit.files.isolation import limits_times
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, iterate_tables

@@ -155,15 +155,20 @@ def load_library(module: str, kind: str) -> ModuleType:
         kind: Format that it reads, for the error: ".xlsx", "Parquet".
 
     Raises:
-        DatasetError: It is not installed.
+        DatasetError: It is not installed, or cannot be loaded.
     """
+    library = module.partition(".")[0]
     try:
         return importlib.import_module(module)
-    except ImportError:
-        library = module.partition(".")[0]
+    except ModuleNotFoundError:
         raise DatasetError(
             f"reading {kind} files needs {library}, which is not installed; install it with pip install 'bowdenfit[lab]'."
         ) from None
+    except ImportError as error:
+        raise DatasetError(
+            f"reading {kind} files needs {library}, which is installed but cannot be loaded ({error}); install it again with "
+            "pip install --force-reinstall 'bowdenfit[lab]'."
+        ) from error
 
 
 @contextmanager

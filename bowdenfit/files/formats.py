@@ -11,8 +11,8 @@ from pathlib import Path
 from weakref import WeakValueDictionary
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.apart import read_isolated
 from bowdenfit.files.channels import ChannelFile
+from bowdenfit.files.isolation import read_isolated
 from bowdenfit.files.text_file import first_bytes
 from bowdenfit.words import shown
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError, Faults
-from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, WORKBOOKS, check_ending, recognize, refuse_sheet
 from bowdenfit.files.headings import heading_of, repeated_heading
+from bowdenfit.files.isolation import LIMITS, call_isolated
 from bowdenfit.files.measured_cells import is_measured, split_measured
 from bowdenfit.files.pivot import unpivot
 from bowdenfit.files.row_account import RowAccount, make_account

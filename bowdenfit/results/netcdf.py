@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from bowdenfit.errors import DatasetError, StoreError
-from bowdenfit.files.apart import Limits, call_isolated
+from bowdenfit.files.isolation import Limits, call_isolated
 from bowdenfit.outputs import replace_atomically
 from bowdenfit.results.folder import kept_file
 from bowdenfit.results.serialization import pack_single, unpack_single

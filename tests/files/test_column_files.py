@@ -365,6 +365,14 @@ def test_a_missing_library_is_named_with_how_to_install_it(module, reader, tmp_p
         reader.read(tmp_path / "run")
 
 
+def test_a_library_that_is_installed_and_broken_is_not_called_missing(tmp_path, monkeypatch):
+    (tmp_path / "openpyxl.py").write_text("raise ImportError('DLL load failed')")
+    monkeypatch.delitem(sys.modules, "openpyxl", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(DatasetError, match=r"needs openpyxl, which is installed but cannot be loaded \(DLL load failed\)"):
+        excel.read(tmp_path / "run")
+
+
 FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
 

@@ -17,8 +17,8 @@ import scipy.io
 from recorded_files import WRITERS, channels_of
 
 import bowdenfit as bf
-from bowdenfit.files import apart, read_channels, tables
-from bowdenfit.files.apart import Limits, limits_times
+from bowdenfit.files import isolation, read_channels, tables
+from bowdenfit.files.isolation import Limits, limits_times
 
 pytestmark = pytest.mark.extended
 
@@ -221,7 +221,7 @@ def test_a_file_that_took_too_much_is_not_tried_again_until_it_changes(tmp_path)
             read_channels(tmp_path / "bad.mat")
         start = time.monotonic()
         with pytest.raises(bf.DatasetError) as second:
-            apart.call_isolated(tmp_path / "bad.mat", "bowdenfit.files:read_here")
+            isolation.call_isolated(tmp_path / "bad.mat", "bowdenfit.files:read_here")
         assert time.monotonic() - start < 0.1 and str(second.value) == str(first.value)
         scipy.io.savemat(tmp_path / "bad.mat", {"F": np.arange(5.0)})
         assert read_channels(tmp_path / "bad.mat").channels
@@ -252,14 +252,31 @@ def test_what_a_killed_reader_was_writing_is_removed(tmp_path, monkeypatch):
     (tmp_path / "reader_that_hangs.py").write_text(LEAVES_A_FILE)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(scratch))
-    with apart._request_lock:
-        if os.getpid() in apart._readers:
-            apart._end_reader(apart._readers[os.getpid()])
+    with isolation._request_lock:
+        if os.getpid() in isolation._readers:
+            isolation._readers.pop(os.getpid()).end()
     (tmp_path / "a.mat").write_bytes(b"x")
     with limits_times(0.1), pytest.raises(bf.DatasetError, match="takes more than"):
-        apart.call_isolated(tmp_path / "a.mat", "reader_that_hangs:read")
+        isolation.call_isolated(tmp_path / "a.mat", "reader_that_hangs:read")
     assert (tmp_path / "started").exists()
     assert list(scratch.iterdir()) == []
+
+
+def test_an_interrupted_request_does_not_answer_the_next_one_and_a_dead_reader_is_replaced(tmp_path, monkeypatch):
+    for i in range(3):
+        scipy.io.savemat(tmp_path / f"{i}.mat", {"F": np.full(5, float(i)), "t": np.arange(5.0)})
+
+    def interrupt(stream):
+        stream.peek(1)  # the answer has come
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(isolation.pickle, "load", interrupt)
+        read_channels(tmp_path / "0.mat")
+    assert read_channels(tmp_path / "1.mat").channels[0].values[0] == 1
+    isolation._readers[os.getpid()].process.kill()
+    isolation._readers[os.getpid()].process.wait()
+    assert read_channels(tmp_path / "2.mat").channels[0].values[0] == 2
 
 
 def test_readers_that_have_nothing_to_do_hold_no_output_of_ours(tmp_path):

@@ -5,7 +5,7 @@ from pathlib import Path
 from bowdenfit.dataset import load_folder_or_file
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import read_channels
-from bowdenfit.files.apart import limits_times
+from bowdenfit.files.isolation import limits_times
 from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.kinds.fit_command import FitCommand, require_recordings
 from bowdenfit.questions.check.single_file import (

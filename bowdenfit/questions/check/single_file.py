@@ -11,11 +11,11 @@ import numpy as np
 from bowdenfit.dataset import Dataset, is_lone_file, single_file_dataset
 from bowdenfit.errors import BowdenfitError, DatasetError
 from bowdenfit.files import read_channels
-from bowdenfit.files.apart import limits_times
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.formats import TEXT, WORKBOOKS
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
+from bowdenfit.files.isolation import limits_times
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, make_commands

@@ -1,16 +1,14 @@
-"""Binary files are read in a process of their own, with so much memory and time as fits their size.
+"""Read binary files in a process of their own, with as much memory and time as fits their size.
 
 The libraries that read them believe what a file says of itself: a file of 200 bytes may declare an array of gigabytes, or
 blocks that point at themselves. Here such a file costs a sentence. What the libraries print stays there too.
 """
 
-import atexit
 import json
 import os
 import pickle
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -37,9 +35,8 @@ except ImportError:  # Windows, where readers have no limits
 _MEMORY, _MEMORY_PER_BYTE = 1 << 29, 40  # bytes; what libraries need by themselves, and what they unpack
 _SECONDS, _SECONDS_PER_BYTE = 8.0, 4e-6  # of CPU
 _WALL = 8  # times the seconds of CPU, for machines that do much besides
-_IDLE = 20.0  # seconds after which a reader with nothing to do ends
 _KILLED = {-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name)}
-_LENGTH, _NO_MEMORY = struct.Struct("<Q"), "no memory"
+_NO_MEMORY, _NO_TIME = "no memory", "no time"
 LIMITS: ContextVar[float] = ContextVar("LIMITS", default=1.0)
 
 
@@ -70,7 +67,8 @@ class Limits:
         """Return the limits for a file, by its size or that of all files in a folder, times `LIMITS`."""
         files = path.rglob("*") if path.is_dir() else [path]
         size, factor = sum(file.stat().st_size for file in files if file.is_file()), LIMITS.get()
-        return cls(int(factor * (_MEMORY + _MEMORY_PER_BYTE * size)), factor * (_SECONDS + _SECONDS_PER_BYTE * size))
+        memory = int(max(factor, 1.0) * (_MEMORY + _MEMORY_PER_BYTE * size))  # no less, or libraries do not even load
+        return cls(memory, factor * (_SECONDS + _SECONDS_PER_BYTE * size))
 
 
 def read_isolated(path: Path, sheet: str = "") -> ChannelFile:
@@ -105,14 +103,13 @@ def call_isolated(path: Path, reader: str, *arguments: Any, limits: Limits | Non
     if key in _too_costly:
         raise DatasetError(_too_costly[key])
     with _request_lock:
-        ended, content = _send_request(path, limits, reader, arguments)
-    refused, result = pickle.loads(content) if content else ("", None)  # noqa: S301  (of our own process)
-    excess = "memory" if refused == _NO_MEMORY else "time" if content is None and ended in _KILLED else ""
-    if excess:
-        _too_costly[key] = _describe_excess(path, limits, excess)
-        raise DatasetError(_too_costly[key])
-    if content is None:
+        answer = _send_request(path, limits, reader, arguments)
+    if isinstance(answer, int) and answer not in _KILLED:
         raise DatasetError(_describe_crash(path))
+    refused, result = (_NO_TIME, None) if isinstance(answer, int) else answer
+    if refused in (_NO_TIME, _NO_MEMORY):
+        _too_costly[key] = _describe_excess(path, limits, refused)
+        raise DatasetError(_too_costly[key])
     if refused:
         raise DatasetError(refused)
     return result
@@ -129,79 +126,71 @@ def _file_key(path: Path) -> Any:
     return path.resolve(), status.st_mtime_ns, status.st_size, status.st_ino, LIMITS.get()
 
 
-def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[int | None, bytes | None]:
-    """Send one request; return the exit code of the reader, None if it still runs, and its answer, None if there is none."""
-    request = json.dumps([str(path.resolve()), limits.memory, limits.seconds, name, arguments]).encode() + b"\n"
-    for _ in range(2):  # one that had nothing to do may just have ended
-        reader = _start_reader()
-        assert reader.stdin is not None and reader.stdout is not None  # both are pipes
+@dataclass(frozen=True)
+class _Reader:
+    """A process that reads files, and its folder for temporary files, which remain there if it is killed."""
+
+    process: "subprocess.Popen[bytes]"
+    scratch: Path
+
+    @classmethod
+    def start(cls) -> "_Reader":
+        """Start a process that neither imports nor follows anything in the working folder."""
+        scratch = tempfile.mkdtemp(prefix="bowdenfit-")
+        process = subprocess.Popen(  # noqa: S603  (our own)
+            python_command("bowdenfit.files.isolation:serve", scratch),
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=scratch,
+            env=safe_environment() | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch),
+        )  # fmt: skip
+        return cls(process, Path(scratch))
+
+    def read(self, request: list[Any], seconds: float) -> tuple[str, Any] | None:
+        """Return the answer to one request, or None if the reader ended without one or was ended after so many seconds."""
+        process = self.process
+        assert process.stdin is not None and process.stdout is not None  # both are pipes
+        too_late = threading.Timer(seconds, process.kill)
+        too_late.daemon = True
+        too_late.start()
         try:
-            reader.stdin.write(request)
-            reader.stdin.flush()
-            content, too_late = _read_answer(reader, _WALL * limits.seconds)
-        except BrokenPipeError:
-            content, too_late = b"", False
-        if content:
-            return None, content
-        if (ended := _end_reader(reader)) != 0 or too_late:
-            return ended, None
-    return 0, None
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.flush()
+            answer: tuple[str, Any] = pickle.load(process.stdout)  # noqa: S301  (of our own process)
+            return answer
+        except (BrokenPipeError, EOFError, pickle.UnpicklingError):
+            return None
+        finally:
+            too_late.cancel()
+
+    def end(self) -> int:
+        """End it, and return its exit code, or minus the signal that it was ended by."""
+        self.process.kill()
+        for stream in (self.process.stdin, self.process.stdout):
+            assert stream is not None  # both are pipes
+            with suppress(BrokenPipeError):
+                stream.close()
+        exit_code = self.process.wait()
+        shutil.rmtree(self.scratch, ignore_errors=True)
+        return exit_code
 
 
-_readers: dict[
-    int, "subprocess.Popen[bytes]"
-] = {}  # by process: a copy of this one starts its own, or answers would mix
-_scratch: dict[int, str] = {}  # folders for temporary files of readers, which may be killed, by process
+_readers: dict[int, _Reader] = {}  # by process: a copy of this one starts its own, or answers would mix
 _request_lock = threading.Lock()
 
 
-def _start_reader() -> "subprocess.Popen[bytes]":
-    """Return the process that reads, started if there is none."""
-    own = os.getpid()
-    if own in _readers and _readers[own].poll() is not None:
-        _end_reader(_readers[own])
-    if own not in _readers:
-        _scratch[own] = tempfile.mkdtemp(prefix="bowdenfit-")
-        command = python_command("bowdenfit.files.apart:serve", _scratch[own])
-        pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
-        environment = safe_environment() | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), _scratch[own])
-        _readers[own] = subprocess.Popen(command, **pipes, env=environment, cwd=_scratch[own])  # noqa: S603  (our own)
-    return _readers[own]
-
-
-@atexit.register
-def _end_all() -> None:
-    """End the reader of this process when Python ends."""
-    if os.getpid() in _readers:
-        _end_reader(_readers[os.getpid()])
-
-
-def _end_reader(reader: "subprocess.Popen[bytes]") -> int:
-    """End a reader, and return its exit code, or minus the signal that it was ended by."""
-    del _readers[os.getpid()]
-    reader.kill()
-    for stream in (reader.stdin, reader.stdout):
-        assert stream is not None  # both are pipes
-        with suppress(BrokenPipeError):
-            stream.close()
-    ended = reader.wait()
-    shutil.rmtree(_scratch.pop(os.getpid()), ignore_errors=True)
-    return ended
-
-
-def _read_answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, bool]:
-    """Return what a reader answers, empty if it ends before that is whole, and whether it was ended for taking too long."""
-    assert reader.stdout is not None  # a pipe
-    killer = threading.Timer(seconds, reader.kill)
-    killer.daemon = True
-    killer.start()
+def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[str, Any] | int:
+    """Return the answer to one request, or how the reader ended that gave none."""
+    process = os.getpid()
+    if process in _readers and _readers[process].process.poll() is not None:
+        _readers.pop(process).end()
+    if process not in _readers:
+        _readers[process] = _Reader.start()
+    request = [str(path.resolve()), limits.memory, limits.seconds, name, arguments]
     try:
-        head = reader.stdout.read(_LENGTH.size)
-        (length,) = _LENGTH.unpack(head) if len(head) == _LENGTH.size else (0,)
-        content = reader.stdout.read(length)
-        return content if len(content) == length else b"", killer.finished.is_set()
-    finally:
-        killer.cancel()
+        answer = _readers[process].read(request, _WALL * limits.seconds)
+    except BaseException:  # such as Ctrl-C in a notebook: the next request must not get this answer
+        _readers.pop(process).end()
+        raise
+    return _readers.pop(process).end() if answer is None else answer
 
 
 def _describe_crash(path: Path) -> str:
@@ -212,9 +201,9 @@ def _describe_crash(path: Path) -> str:
     )
 
 
-def _describe_excess(path: Path, limits: Limits, what: str) -> str:
+def _describe_excess(path: Path, limits: Limits, lack: str) -> str:
     """Return what is said of a file that takes more than its limits."""
-    most = f"{limits.memory / 2**20:.0f} MiB of memory" if what == "memory" else f"{limits.seconds:.0f} s"
+    most = f"{limits.memory / 2**20:.0f} MiB of memory" if lack == _NO_MEMORY else f"{limits.seconds:.0f} s"
     return (
         f"{path.name} takes more than {most} to read, far more than fits its size: it is damaged, or made to do so. Copy it "
         "again from the acquisition computer; if it is as it should be, allow more with --reading-limit 4."
@@ -222,7 +211,7 @@ def _describe_excess(path: Path, limits: Limits, what: str) -> str:
 
 
 def serve(scratch: str) -> None:
-    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while.
+    """Read one file after the other, as asked on standard input, until that ends.
 
     Args:
         scratch: Folder for temporary files, removed at the end; whoever kills this process removes it otherwise.
@@ -230,29 +219,14 @@ def serve(scratch: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print
-
-    def end(code: int = 0) -> None:
-        shutil.rmtree(scratch, ignore_errors=True)
-        os._exit(code)
-
-    code = 1
     try:
-        while True:
-            idle = threading.Timer(_IDLE, end)
-            idle.daemon = True
-            idle.start()
-            line = sys.stdin.buffer.readline()
-            idle.cancel()
-            if not line:
-                break
+        for line in sys.stdin.buffer:
             path, memory, seconds, name, arguments = json.loads(line)
             _limit_process(memory, seconds)
-            content = pickle.dumps(_call(name, Path(path), arguments), protocol=5)
-            answers.write(_LENGTH.pack(len(content)) + content)
+            answers.write(pickle.dumps(_call(name, Path(path), arguments), protocol=5))
             answers.flush()
-        code = 0
     finally:
-        end(code)
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _call(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:

@@ -4,6 +4,7 @@ The libraries that read them believe what a file says of itself: a file of 200 b
 blocks that point at themselves. Here such a file costs a sentence. What the libraries print stays there too.
 """
 
+import atexit
 import json
 import os
 import pickle
@@ -177,20 +178,26 @@ _readers: dict[int, _Reader] = {}  # by process: a copy of this one starts its o
 _request_lock = threading.Lock()
 
 
+@atexit.register
+def _end_reader() -> int:
+    """End the reader of this process, and return its exit code; 0 if there is none."""
+    return _readers.pop(os.getpid()).end() if os.getpid() in _readers else 0
+
+
 def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[str, Any] | int:
     """Return the answer to one request, or how the reader ended that gave none."""
     process = os.getpid()
     if process in _readers and _readers[process].process.poll() is not None:
-        _readers.pop(process).end()
+        _end_reader()
     if process not in _readers:
         _readers[process] = _Reader.start()
     request = [str(path.resolve()), limits.memory, limits.seconds, name, arguments]
     try:
         answer = _readers[process].read(request, _WALL * limits.seconds)
     except BaseException:  # such as Ctrl-C in a notebook: the next request must not get this answer
-        _readers.pop(process).end()
+        _end_reader()
         raise
-    return _readers.pop(process).end() if answer is None else answer
+    return _end_reader() if answer is None else answer
 
 
 def _describe_crash(path: Path) -> str:

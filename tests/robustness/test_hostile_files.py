@@ -253,8 +253,7 @@ def test_what_a_killed_reader_was_writing_is_removed(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(scratch))
     with isolation._request_lock:
-        if os.getpid() in isolation._readers:
-            isolation._readers.pop(os.getpid()).end()
+        isolation._end_reader()
     (tmp_path / "a.mat").write_bytes(b"x")
     with limits_times(0.1), pytest.raises(bf.DatasetError, match="takes more than"):
         isolation.call_isolated(tmp_path / "a.mat", "reader_that_hangs:read")

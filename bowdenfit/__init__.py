@@ -13,35 +13,35 @@ if TYPE_CHECKING:
     from typing import Any
 
     from bowdenfit.addons import *  # noqa: F403  (its functions are not named in the core)
-    from bowdenfit.cable_model import model
-    from bowdenfit.described_cable import Cable, Contact
-    from bowdenfit.errors import (
-        BowdenfitError,
-        ConvergenceError,
-        DatasetError,
-        DescriptionError,
-        StoreError,
-        UsageError,
-    )
-    from bowdenfit.finished_fit import Fit, load
-    from bowdenfit.questions.calibrate.verb import calibrate
-    from bowdenfit.questions.check.verb import check
-    from bowdenfit.questions.compare.verb import compare
-    from bowdenfit.questions.export.verb import export
-    from bowdenfit.questions.identify.verb import identify
-    from bowdenfit.questions.next.verb import next_measurement
-    from bowdenfit.questions.predict.verb import predict
-    from bowdenfit.questions.report.verb import report
-    from bowdenfit.questions.schema.verb import schema
-    from bowdenfit.questions.simulate.verb import simulate
-    from bowdenfit.questions.summary.verb import plot
-    from bowdenfit.questions.watch.verb import watch
-    from bowdenfit.reading import read
-    from bowdenfit.run.verb import fit
+    from bowdenfit.cable_model import model as model
+    from bowdenfit.described_cable import Cable as Cable
+    from bowdenfit.described_cable import Contact as Contact
+    from bowdenfit.errors import BowdenfitError as BowdenfitError
+    from bowdenfit.errors import ConvergenceError as ConvergenceError
+    from bowdenfit.errors import DatasetError as DatasetError
+    from bowdenfit.errors import DescriptionError as DescriptionError
+    from bowdenfit.errors import StoreError as StoreError
+    from bowdenfit.errors import UsageError as UsageError
+    from bowdenfit.finished_fit import Fit as Fit
+    from bowdenfit.finished_fit import load as load
+    from bowdenfit.questions.calibrate.verb import calibrate as calibrate
+    from bowdenfit.questions.check.verb import check as check
+    from bowdenfit.questions.compare.verb import compare as compare
+    from bowdenfit.questions.export.verb import export as export
+    from bowdenfit.questions.identify.verb import identify as identify
+    from bowdenfit.questions.next.verb import next_measurement as next_measurement
+    from bowdenfit.questions.predict.verb import predict as predict
+    from bowdenfit.questions.report.verb import report as report
+    from bowdenfit.questions.schema.verb import schema as schema
+    from bowdenfit.questions.simulate.verb import simulate as simulate
+    from bowdenfit.questions.summary.verb import plot as plot
+    from bowdenfit.questions.watch.verb import watch as watch
+    from bowdenfit.reading import read as read
+    from bowdenfit.run.verb import fit as fit
 
     __version__: str
 
-_WHERE = {
+_MODULES = {  # of the public names above; tests/house/test_contracts.py compares
     "Cable": "bowdenfit.described_cable",
     "Contact": "bowdenfit.described_cable",
     "Fit": "bowdenfit.finished_fit",
@@ -67,36 +67,8 @@ _WHERE = {
     ),
 }
 
-__all__ = [
-    "BowdenfitError",
-    "Cable",
-    "Contact",
-    "ConvergenceError",
-    "DatasetError",
-    "DescriptionError",
-    "Fit",
-    "StoreError",
-    "UsageError",
-    "calibrate",
-    "check",
-    "compare",
-    "export",
-    "fit",
-    "identify",
-    "load",
-    "model",
-    "next_measurement",
-    "plot",
-    "predict",
-    "read",
-    "report",
-    "schema",
-    "simulate",
-    "watch",
-]
-
-
 if not TYPE_CHECKING:  # to type checkers there are the names above, and no others
+    __all__ = sorted(_MODULES)
 
     def __getattr__(name: str) -> "Any":
         """Load a public name when it is first used; a name that is not of the core is looked for among the verbs of add-ons."""
@@ -107,8 +79,8 @@ if not TYPE_CHECKING:  # to type checkers there are the names above, and no othe
             from importlib.metadata import version
 
             return version("bowdenfit")
-        if name in _WHERE:
-            return getattr(import_module(_WHERE[name]), name)
+        if name in _MODULES:
+            return getattr(import_module(_MODULES[name]), name)
         if not name.startswith("_") and find_spec(f"{__name__}.{name}") is None:  # a module of the core has precedence
             from bowdenfit.extensions import list_problems
             from bowdenfit.verb import load_added_verb
@@ -122,7 +94,7 @@ if not TYPE_CHECKING:  # to type checkers there are the names above, and no othe
 
 
 def __dir__() -> list[str]:
-    """Return the names above, and the functions of add-ons."""
+    """Return the public names, and the functions of add-ons."""
     from bowdenfit.verb import load_added_verbs
 
     return [*__all__, *(verb.command_name for verb in load_added_verbs() if not verb.serves)]

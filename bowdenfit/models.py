@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bowdenfit.cable.cable import Cable, constant_angle_name
+from bowdenfit.cable.cable import CableContacts, constant_angle_name
 from bowdenfit.cable.registry import split_coefficient
 from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.dataset import Dataset
@@ -36,7 +36,7 @@ from bowdenfit.words import listed
 class Model(Display):
     """Everything inference needs: cable, parameters, terms of the likelihood, and where readings were taken."""
 
-    cable: Cable
+    cable: CableContacts
     space: ParameterSpace
     terms: tuple[Term, ...]
     covariates: Mapping[str, Covariates] = field(default_factory=dict, compare=False)
@@ -79,7 +79,7 @@ def build_model(dataset: Dataset) -> Model:
     return Model(cable, space, tuple(terms), places)
 
 
-def _build_space(cable: Cable, measurements: Measurements) -> ParameterSpace:
+def _build_space(cable: CableContacts, measurements: Measurements) -> ParameterSpace:
     """Return all parameters as the user has set them; their order is that of z."""
     description, defaults = cable.description, PriorDefaults()
     requested = collect_parameters(cable, measurements)

@@ -15,7 +15,7 @@ from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.friction_options import friction_options
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, coefficient_of, load_class, sheath_length
-from bowdenfit.description import Contact, Description, PriorDefaults
+from bowdenfit.description import ContactSettings, Description, PriorDefaults
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
@@ -24,7 +24,7 @@ ANGLE_NOISE = "sigma_theta"
 
 
 @dataclass(frozen=True)
-class Cable:
+class CableContacts:
     """Contacts in series along one route.
 
     Args:
@@ -47,7 +47,7 @@ class Cable:
             if route is not None and source.column is not None and source.curve is not None
         }
 
-    def departing(self, columns: Collection[str]) -> "Cable":
+    def departing(self, columns: Collection[str]) -> "CableContacts":
         """Return the cable with smooth departures of the angles in columns from their curves."""
         contacts = []
         for contact in self.description.contact:
@@ -100,7 +100,7 @@ class Cable:
         return jnp.stack(columns, axis=-1)
 
     def _wrap_angle(
-        self, contact: Contact, values: Mapping[str, Array], route: Float[Array, " rows"]
+        self, contact: ContactSettings, values: Mapping[str, Array], route: Float[Array, " rows"]
     ) -> Float[Array, " rows"]:
         source = contact.wrap_angle
         if source.curve and source.column:
@@ -239,12 +239,12 @@ class Cable:
         return self.friction_exponent(values, self.wrap_angles(values, route), route=route)
 
 
-def constant_angle_name(contact: Contact) -> str:
+def constant_angle_name(contact: ContactSettings) -> str:
     """Return the name of the parameter for a constant wrap angle that is itself uncertain."""
     return parameter_of("wrap_angle", contact.name)
 
 
-def make_cable(description: Description, own_angles: Mapping[str, float], conditions: Conditions) -> Cable:
+def make_cable(description: Description, own_angles: Mapping[str, float], conditions: Conditions) -> CableContacts:
     """Return the cable of a description.
 
     Args:
@@ -267,4 +267,4 @@ def make_cable(description: Description, own_angles: Mapping[str, float], condit
                 'angle; state it as nominal = { value = 90, unit = "deg" } of the contact.'
             )
         nominal[contact.name] = source.nominal.to("angle") if source.nominal else own_angles[source.column]
-    return Cable(description, nominal, FrictionModel(friction_options(description.friction_model), conditions))
+    return CableContacts(description, nominal, FrictionModel(friction_options(description.friction_model), conditions))

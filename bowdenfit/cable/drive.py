@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.sensors import LoadCells
@@ -190,7 +190,7 @@ class LoopDrive:
 
 
 def make_drive(
-    cable: Cable,
+    cable: CableContacts,
     values: Mapping[str, Array],
     wrap_angles: Float[Array, "recordings contacts"],
     velocity: PerTime,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from bowdenfit.description import Contact, Description, QuantityValue
+from bowdenfit.description import ContactSettings, Description, QuantityValue
 from bowdenfit.errors import DescriptionError, suggest_name
 from bowdenfit.units import conversion_factor, dimension_of
 
@@ -57,7 +57,7 @@ def check_names(description: Description) -> None:
         _check_length(description, contact)
 
 
-def _check_length(description: Description, contact: Contact) -> None:
+def _check_length(description: Description, contact: ContactSettings) -> None:
     """Refuse a contact whose law depends on a length that is not known, and a length that its law does not depend on.
 
     Raises:
@@ -87,7 +87,7 @@ def _check_length(description: Description, contact: Contact) -> None:
         )
 
 
-def sheath_length(description: Description, contact: Contact) -> tuple[float, float]:
+def sheath_length(description: Description, contact: ContactSettings) -> tuple[float, float]:
     """Return the length of a contact's sheath: what is constant of it [m], and what a unit of the route variable adds [m]."""
     if isinstance(contact.length, QuantityValue):
         return contact.length.to("length") / 1000, 0.0

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from bowdenfit.description.cable_parts import CableSettings, Contact, Route, WrapAngle
+from bowdenfit.description.cable_parts import CableSettings, ContactSettings, Route, WrapAngle
 from bowdenfit.description.defaults import BenchErrors, PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.measurements import (
     MOST_FILES,
@@ -48,7 +48,7 @@ __all__ = [
     "SCHEMA",
     "BenchErrors",
     "CableSettings",
-    "Contact",
+    "ContactSettings",
     "Description",
     "Finite",
     "ForceLimits",
@@ -111,7 +111,7 @@ class Description(Display, Frozen):
     reference_velocity: QuantityValue | None = None
     cable: CableSettings = CableSettings()
     route: Route | None = None
-    contact: Annotated[tuple[Contact, ...], Field(min_length=1, max_length=_MOST_CONTACTS)]
+    contact: Annotated[tuple[ContactSettings, ...], Field(min_length=1, max_length=_MOST_CONTACTS)]
     friction: dict[str, FrictionSetting] = Field(default_factory=dict, max_length=_MOST_SETTINGS)
     prior: dict[str, ParameterSetting] = Field(default_factory=dict, max_length=_MOST_SETTINGS)
     stretch: StretchSettings = StretchSettings()
@@ -132,7 +132,7 @@ class Description(Display, Frozen):
 
     @field_validator("contact")
     @classmethod
-    def _distinct(cls, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+    def _distinct(cls, contacts: tuple[ContactSettings, ...]) -> tuple[ContactSettings, ...]:
         for names, what in (
             ([c.name for c in contacts], "name"),
             ([c.wrap_angle.column or "" for c in contacts if c.wrap_angle.curve], "curve's column"),
@@ -232,7 +232,7 @@ class Description(Display, Frozen):
         return any(c.wrap_angle.route is not None for c in self.contact)
 
     @property
-    def curved(self) -> tuple[Contact, ...]:
+    def curved(self) -> tuple[ContactSettings, ...]:
         """Contacts whose wrap angle is a curve."""
         return tuple(c for c in self.contact if c.wrap_angle.curve)
 

@@ -112,7 +112,7 @@ class WrapAngle(Frozen):
         return QuantityValue(value=self.value, unit=self.unit, sd=self.sd)
 
 
-class Contact(Frozen):
+class ContactSettings(Frozen):
     """One place where rope rubs; whether its coefficient may be another in each group of readings, if groups are asked for."""
 
     name: Name

@@ -135,7 +135,7 @@ def _siblings(model: Any, path: Sequence[str]) -> list[str]:
 
 
 def _models_in(annotation: Any) -> Any:
-    """Return the first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
+    """Return the first model inside an annotation such as `tuple[ContactSettings, ...]` or `Route | None`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
 
@@ -61,7 +61,7 @@ class Situation:
         parameters: Names of the model's parameters.
     """
 
-    cable: Cable
+    cable: CableContacts
     measurements: Measurements
     parameters: frozenset[str]
 
@@ -200,7 +200,7 @@ class CandidateKind(ABC):
         """Heading of such candidates in figures."""
         return self.noun[0].upper() + self.noun[1:]
 
-    def describe_measurement(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: CableContacts) -> str:
         """Return what is measured, such as "the stretch"."""
         return f"the {self.noun}"
 

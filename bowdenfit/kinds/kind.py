@@ -31,7 +31,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from typing_extensions import override
 
-from bowdenfit.description import Contact, Description, Table, TableSettings
+from bowdenfit.description import ContactSettings, Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, Faults
@@ -290,7 +290,7 @@ class FrictionTableKind(FrictionKind[AnyRows]):
         faults.refuse()
 
 
-def _check_contact(description: Description, angles: AngleTable | None, contact: Contact, table: Rows) -> None:
+def _check_contact(description: Description, angles: AngleTable | None, contact: ContactSettings, table: Rows) -> None:
     column = contact.wrap_angle.column or ""
     own_angles, _ = table.own.column(column)
     if not contact.wrap_angle.curve:

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable
+from bowdenfit.cable.cable import ANGLE_NOISE, CableContacts
 from bowdenfit.description import Description
 from bowdenfit.kinds.rows import ForceRows
 from bowdenfit.kinds.tables import AngleTable
@@ -111,7 +111,7 @@ def find_measured_angle(angles: AngleTable, column: str, at: float) -> tuple[flo
 
 
 def resolve_angles(
-    cable: Cable, values: Mapping[str, Array], rows: RowAngles
+    cable: CableContacts, values: Mapping[str, Array], rows: RowAngles
 ) -> tuple[Float[Array, "rows contacts"], Float[Array, "rows contacts"]]:
     """Return wrap angle [rad] and its variance [rad^2] for each row and contact, at given parameters."""
     angles = jnp.where(rows.is_own, rows.own, cable.wrap_angles(values, rows.route))

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.sensors import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.row_angles import RowAngles, resolve_angles
 from bowdenfit.kinds.sliding_rows import InsideRuns, SlidingRows, list_readings_inside_runs
@@ -137,7 +137,7 @@ class RunsTerm:
         rows: The readings that the arrays sum up; None where nobody asks for them one by one.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: RunsData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "run_efficiency"
@@ -308,7 +308,7 @@ class _Deviations:
     inside: Array
 
 
-def sum_runs(cable: Cable, rows: SlidingRows) -> RunsData:
+def sum_runs(cable: CableContacts, rows: SlidingRows) -> RunsData:
     """Reduce readings to cells and cells to runs: all that the likelihood needs, whatever the number of readings."""
     cell, first = _assign_cells(cable, rows)
     weight = rows.weight(cable.description.sensors.noise_ratio)
@@ -375,7 +375,7 @@ def _pad_runs(cells: RunCells) -> RunCells:
     return cells.select(source).without_weight((position >= counts[:, None]).ravel())
 
 
-def _assign_cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
+def _assign_cells(cable: CableContacts, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
     """Return the cell of each reading, and the first reading of each cell."""
     keys = [rows.run, rows.stroke, *jax.tree.leaves(rows.angles)]
     if cable.friction.depends_on_rate:

@@ -23,7 +23,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.sensors import NoiseLaw, noise_law, scatter
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.candidate import CandidateKind
@@ -48,7 +48,7 @@ class Term(Protocol):
     """
 
     @property
-    def cable(self) -> Cable:
+    def cable(self) -> CableContacts:
         """The cable."""
         ...
 
@@ -118,7 +118,7 @@ class Circumstances:
         defaults: Priors of what the user says nothing of.
     """
 
-    cable: Cable
+    cable: CableContacts
     measurements: Measurements
     mountings_scatter: bool
     defaults: PriorDefaults = field(default_factory=PriorDefaults)
@@ -147,7 +147,7 @@ class Truth:
         scale: Factor on all noise.
     """
 
-    cable: Cable
+    cable: CableContacts
     angles: AngleTable | None
     values: Mapping[str, Array]
     key: Array
@@ -191,7 +191,7 @@ class TermKind(ABC, Generic[AnyTable]):
         """Name of the kind in KINDS."""
 
     @abstractmethod
-    def terms(self, cable: Cable, table: AnyTable, angles: AngleTable | None) -> Sequence[Term]:
+    def terms(self, cable: CableContacts, table: AnyTable, angles: AngleTable | None) -> Sequence[Term]:
         """Return the terms of a table.
 
         Args:
@@ -278,7 +278,7 @@ class IndependentReadings(ABC):
         labels: Each reading in words.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: Any = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
 

@@ -9,7 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable, make_cable
+from bowdenfit.cable.cable import ANGLE_NOISE, CableContacts, make_cable
 from bowdenfit.cable.conditions import make_conditions
 from bowdenfit.cable.elasticity import (
     BEDDING_LOAD,
@@ -93,7 +93,7 @@ def iterate_term_kinds(measurements: Measurements) -> Iterator[tuple[TermKind[An
         yield TERMS[kind.name], table
 
 
-def collect_parameters(cable: Cable, measurements: Measurements) -> list[Parameter]:
+def collect_parameters(cable: CableContacts, measurements: Measurements) -> list[Parameter]:
     """Collect the parameters that the kinds of a data set need, each declared once."""
     kinds = list(iterate_term_kinds(measurements))
     circumstances = Circumstances(cable, measurements, any(kind.shows_mounting_scatter for kind, _ in kinds))
@@ -118,7 +118,7 @@ def find_term_kind(readings: str) -> TermKind[Any]:
     return TERMS[kind.name if kind is not None else readings]
 
 
-def make_measured_cable(description: Description, measurements: Measurements) -> Cable:
+def make_measured_cable(description: Description, measurements: Measurements) -> CableContacts:
     """Return the cable of a description; nominal angles, reference force and speed are measured ones where none is stated.
 
     Raises:
@@ -163,7 +163,7 @@ def _concatenate_positive(parts: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def draw_readings(
-    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float = 1.0
+    cable: CableContacts, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float = 1.0
 ) -> Readings:
     """Draw new readings by kind of table, in a function that JAX can compile.
 

@@ -26,7 +26,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import BATCH, run_in_batches
@@ -234,7 +234,7 @@ def _data_with(fit: Record, error: BenchError) -> tuple[Any, ...]:
     return tuple(_with_constant_angles(term.data, cable, error) for term in terms)
 
 
-def _with_constant_angles(data: Any, cable: Cable, error: BenchError) -> Any:
+def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) -> Any:
     """Return data of a term whose rows also hold the constant wrap angles of cable.toml, those without a stated error."""
     if isinstance(data, RunsData):
         return replace(data, cells=_with_constant_angles(data.cells, cable, error))

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
@@ -56,7 +56,7 @@ class PredictionAngles:
         scores = [np.random.default_rng(seed).standard_normal((n, rows.own.shape[1])) for seed in seeds]
         return np.concatenate(scores, axis=1)
 
-    def resolve(self, cable: Cable, values: Mapping[str, Array], errors: Array) -> Float[Array, "places contacts"]:
+    def resolve(self, cable: CableContacts, values: Mapping[str, Array], errors: Array) -> Float[Array, "places contacts"]:
         """Return the wrap angles [rad] at given parameters and errors, which make none negative."""
         angles, variance = resolve_angles(cable, values, jax.tree.map(jnp.asarray, self.rows))
         if not errors.size:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.description import Contact, Description, WrapAngle
+from bowdenfit.description import ContactSettings, Description, WrapAngle
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.files.columns import Column, find_columns
 from bowdenfit.files.headings import Quantity
@@ -44,7 +44,7 @@ def measure_routes(description: Description, folder: Path) -> tuple[Description,
     return description.model_copy(update={"contact": tuple(contacts)}), files, tuple(remarks)
 
 
-def _path_of(contact: Contact, folder: Path) -> Path:
+def _path_of(contact: ContactSettings, folder: Path) -> Path:
     """Return the file of a route, which must be in the folder of the description."""
     path = folder / str(contact.wrap_angle.route)
     try:
@@ -104,7 +104,7 @@ def _refuse_repeated(points: Points, column: Column) -> None:
         )
 
 
-def _measure(contact: Contact, points: Points, file: str) -> Turning:
+def _measure(contact: ContactSettings, points: Points, file: str) -> Turning:
     """Return the angle of a route, unless errors of its points make up too much of it."""
     source = contact.wrap_angle
     error = source.error.to("length") if source.error is not None else 0.0
@@ -124,14 +124,14 @@ def _measure(contact: Contact, points: Points, file: str) -> Turning:
     return turning
 
 
-def _with_angle(contact: Contact, turning: Turning) -> Contact:
+def _with_angle(contact: ContactSettings, turning: Turning) -> ContactSettings:
     """Return a contact whose wrap angle is constant."""
     sd = round(degrees(turning.sd), 4) if turning.sd > _LEAST_ERROR else None
     angle = WrapAngle(value=round(degrees(turning.angle), 4), unit="deg", sd=sd)
     return contact.model_copy(update={"wrap_angle": angle})
 
 
-def _remark(contact: Contact, points: int, turning: Turning) -> str:
+def _remark(contact: ContactSettings, points: int, turning: Turning) -> str:
     """Say which angle a route gave."""
     source = contact.wrap_angle
     exact = "" if source.error is not None else "; its points count as exact, since no error is stated"

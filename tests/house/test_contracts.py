@@ -1,5 +1,6 @@
 """Rules of the house that a machine can check: layers, lazy imports, and what registered laws and curves must offer."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -163,6 +164,18 @@ def test_every_public_name_is_documented():
 
     for name in bowdenfit.__all__:
         assert getattr(bowdenfit, name).__doc__, name
+
+
+def test_type_checkers_and_python_have_the_same_public_names():
+    import bowdenfit
+
+    imports = [
+        node
+        for node in ast.walk(ast.parse(Path(bowdenfit.__file__).read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("bowdenfit.") and node.col_offset == 4
+    ]
+    names = {alias.asname: node.module for node in imports for alias in node.names if alias.name != "*"}
+    assert names == bowdenfit._MODULES
 
 
 def test_inner_functions_refuse_32_bit_floats(on_body):

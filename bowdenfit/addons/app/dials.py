@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.arguments import Stroke
-from bowdenfit.description import Contact
+from bowdenfit.description import ContactSettings
 from bowdenfit.finished_fit import Fit
 from bowdenfit.questions.predict.measured_range import find_measured_range
 from bowdenfit.questions.predict.predictions import Predictions
@@ -90,7 +90,7 @@ def _dial(key: str, label: str, unit: str, low: float, high: float, value: float
     return Dial(key, label, unit, least, most, step, min(max(round(value / step) * step, least), most))
 
 
-def _nominal_bend(contact: Contact) -> float:
+def _nominal_bend(contact: ContactSettings) -> float:
     """Return the wrap angle at which a contact is first shown [deg]."""
     source = contact.wrap_angle
     stated = source.constant or source.nominal

@@ -13,7 +13,7 @@ import jax
 import numpy as np
 from jax import Array
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.term import Term, find_row_angles
@@ -77,7 +77,7 @@ def _has_angles(model: Model) -> bool:
     return all(rows is not None and np.all(rows.is_own[..., nominal]) for rows in angles)
 
 
-def _with_cable(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:
+def _with_cable(cable: CableContacts, space: ParameterSpace, terms: Sequence[Term]) -> Model:
     """Return a model of the same terms with another cable."""
     return Model(cable, space, tuple(replace(term, cable=cable) for term in terms))  # type: ignore[type-var]
 

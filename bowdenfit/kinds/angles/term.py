@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable
+from bowdenfit.cable.cable import ANGLE_NOISE, CableContacts
 from bowdenfit.cable.sensors import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
@@ -63,7 +63,7 @@ class AnglesTerm:
         labels: Each reading in words, detected ones first.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: AnglesData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "wrap_angle"
@@ -121,7 +121,7 @@ class AnglesTerm:
         return np.rad2deg(np.concatenate([self.data.angle, np.full(len(self.data.limit), np.nan)]))
 
 
-def make_angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
+def make_angles_term(cable: CableContacts, table: AngleTable) -> AnglesTerm:
     """Return the term of an angle table, with undetected angles entering as the description says."""
     description = cable.description
     settings, route, published = (
@@ -215,7 +215,7 @@ class AngleCandidates(CandidateKind):
         return bool(at.cable.curves)
 
     @override
-    def describe_measurement(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: CableContacts) -> str:
         return "the wrap angles" if len(cable.curves) > 1 else "the wrap angle"
 
     @override
@@ -245,7 +245,7 @@ class AngleTerms(TermKind[AngleTable]):
     chooses_rows = True
 
     @override
-    def terms(self, cable: Cable, table: AngleTable, angles: AngleTable | None) -> tuple[AnglesTerm]:
+    def terms(self, cable: CableContacts, table: AngleTable, angles: AngleTable | None) -> tuple[AnglesTerm]:
         return (make_angles_term(cable, table),)
 
     @override

@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.sensors import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementSettings, DisplacementTable, Turns
@@ -105,7 +105,7 @@ def split_turns_by_depth(turns: Turns) -> tuple[TurnArrays, ...]:
     return tuple(jax.tree.map(lambda values, mask=mask: values[mask], arrays) for mask in by_depth)
 
 
-def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> RowAngles:
+def angles_of_runs(cable: CableContacts, table: DisplacementTable, angles: AngleTable | None) -> RowAngles:
     """Return the wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
     own_angles = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
@@ -146,7 +146,7 @@ class DisplacementTerm:
         reading_noise: Noise scale of the second block of residuals, that of runs.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: DisplacementData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     zeros: tuple[str, ...]
@@ -321,7 +321,7 @@ def _sum_before(terms: Float[Array, " rows"], start: Array) -> Float[Array, " ro
     return total - total[start]
 
 
-def make_displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
+def make_displacement_term(cable: CableContacts, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
     """Return the term of a table of force against displacement."""
     rows = rows_by_run(table)
     settings = cable.description.table(DisplacementSettings)
@@ -398,7 +398,7 @@ class DisplacementTerms(TermKind[DisplacementTable]):
     shows_mounting_scatter = True
 
     @override
-    def terms(self, cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> tuple[DisplacementTerm]:
+    def terms(self, cable: CableContacts, table: DisplacementTable, angles: AngleTable | None) -> tuple[DisplacementTerm]:
         return (make_displacement_term(cable, table, angles),)
 
     @override

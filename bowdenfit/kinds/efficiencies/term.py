@@ -10,7 +10,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.sensors import RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
@@ -63,7 +63,7 @@ class EfficienciesTerm:
         labels: Each row in words.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: EfficienciesData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "efficiency"
@@ -121,7 +121,7 @@ class EfficienciesTerm:
         return np.exp(-self.data.loss)
 
 
-def make_efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
+def make_efficiencies_term(cable: CableContacts, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
     """Return the term of an efficiency table."""
     rows = collect_row_angles(cable.description, table, angles)
     data = EfficienciesData(rows, -np.log(table.efficiency), table.sd / table.efficiency)
@@ -162,7 +162,7 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
     shows_mounting_scatter = True
 
     @override
-    def terms(self, cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> tuple[EfficienciesTerm]:
+    def terms(self, cable: CableContacts, table: EfficiencyTable, angles: AngleTable | None) -> tuple[EfficienciesTerm]:
         return (make_efficiencies_term(cable, table, angles),)
 
     @override

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.sensors import BLOCK_NOISE, FORCE_NOISE, RUN_SCATTER, LoadCells, scatter
 from bowdenfit.kinds.candidate import (
     STROKE_WORDS,
@@ -118,7 +118,7 @@ def set_load_and_stroke(design: RunDesign, load: float, stroke: int) -> RunDesig
 
 
 def make_run_simulator(
-    cable: Cable, design: RunDesign
+    cable: CableContacts, design: RunDesign
 ) -> tuple[Callable[[Mapping[str, Array], RowAngles, Array], Array], int]:
     """Return a function that simulates runs at rows of wrap angles, and how many numbers it gives for each.
 
@@ -151,7 +151,7 @@ def make_run_simulator(
     return simulate, fit.shape[1]
 
 
-def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
+def _straight_line(cable: CableContacts, design: RunDesign) -> np.ndarray:
     """Return the matrix from log ratios to the coefficients of their weighted least-squares fit."""
     columns = [np.ones(len(design.stroke))]
     if len(np.unique(design.stroke)) > 1:
@@ -185,7 +185,7 @@ class ForceRunCandidates(CandidateKind):
         return typical_run(at.measurements) is not None
 
     @override
-    def describe_measurement(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: CableContacts) -> str:
         return f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}"
 
     @override

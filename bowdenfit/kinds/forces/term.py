@@ -10,7 +10,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.kinds.forces.mountings import group_numbers
@@ -76,7 +76,7 @@ class HeldForcesTerm:
         reading_noise: Parameter in units of which the noise of each reading is given.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: HeldForcesData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = "held_ratio"
@@ -156,7 +156,7 @@ class HeldForcesTerm:
         return ratio
 
 
-def _number_groups(cable: Cable, table: ForceTable) -> Labels:
+def _number_groups(cable: CableContacts, table: ForceTable) -> Labels:
     """Return the number of each row's group."""
     return group_numbers(cable.friction.groups, table.group, len(table.run))
 
@@ -250,7 +250,7 @@ def _unused_columns(table: ForceTable, used: np.ndarray) -> dict[str, UnusedColu
     return choose_unused_columns({heading: x[used] for heading, x in table.unused.items()}, *calculated)
 
 
-def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
+def _run_label(cable: CableContacts, table: ForceTable, run: int) -> str:
     """Return the name of a run, with its route value where it has just one."""
     route = cable.description.route
     if route is None:
@@ -269,7 +269,7 @@ class ForceTerms(TermKind[ForceTable]):
 
     @override
     def terms(
-        self, cable: Cable, table: ForceTable, angles: AngleTable | None
+        self, cable: CableContacts, table: ForceTable, angles: AngleTable | None
     ) -> tuple[RunsTerm | HeldForcesTerm, ...]:
         """Return a term of the sliding rows by run, and one of the held rows one by one."""
         rows = replace(collect_row_angles(cable.description, table, angles), group=_number_groups(cable, table))

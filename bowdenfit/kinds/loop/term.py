@@ -11,7 +11,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
@@ -79,7 +79,7 @@ class LoopTerm:
         labels: Each row in words.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: LoopData = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     name: str = LOOP_FORCE
@@ -147,7 +147,7 @@ class LoopTerm:
         return self.data.output_force
 
 
-def make_loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
+def make_loop_term(cable: CableContacts, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
     """Return the term of a loop table."""
     rows = collect_row_angles(cable.description, table, angles)
     has_preload = np.isfinite(table.preload)
@@ -176,7 +176,7 @@ class LoopCandidates(CandidateKind):
         return at.cable.is_loop
 
     @override
-    def describe_measurement(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: CableContacts) -> str:
         return "the loop's output force"
 
     @override
@@ -203,7 +203,7 @@ class LoopTerms(TermKind[LoopTable]):
     candidate = LoopCandidates()
 
     @override
-    def terms(self, cable: Cable, table: LoopTable, angles: AngleTable | None) -> tuple[LoopTerm]:
+    def terms(self, cable: CableContacts, table: LoopTable, angles: AngleTable | None) -> tuple[LoopTerm]:
         return (make_loop_term(cable, table, angles),)
 
     @override

@@ -10,7 +10,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.sensors import noise_law
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
@@ -124,7 +124,7 @@ class PreloadTerm(IndependentReadings):
         return np.concatenate([self.data.reading, self.data.at_most])
 
 
-def make_preload_term(cable: Cable, table: PreloadTable) -> PreloadTerm:
+def make_preload_term(cable: CableContacts, table: PreloadTable) -> PreloadTerm:
     """Return the term of a table of preload; rows that read 0 come last."""
     slack = table.preload == 0
     angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
@@ -161,7 +161,7 @@ class PreloadTerms(TermKind[PreloadTable]):
     candidate = PreloadCandidates()
 
     @override
-    def terms(self, cable: Cable, table: PreloadTable, angles: AngleTable | None) -> tuple[PreloadTerm]:
+    def terms(self, cable: CableContacts, table: PreloadTable, angles: AngleTable | None) -> tuple[PreloadTerm]:
         return (make_preload_term(cable, table),)
 
     @override

@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.friction_options import FRICTION_OPTIONS, friction_options
@@ -84,7 +84,7 @@ class RecordingTerms(TermKind[Recordings]):
     shows_mounting_scatter = True
 
     @override
-    def terms(self, cable: Cable, table: Recordings, angles: AngleTable | None) -> tuple[Term]:
+    def terms(self, cable: CableContacts, table: Recordings, angles: AngleTable | None) -> tuple[Term]:
         return (make_recordings_term(cable, table, angles),)
 
     @override
@@ -145,7 +145,7 @@ class RecordingTerms(TermKind[Recordings]):
 
 
 def make_recordings_term(
-    cable: Cable, recordings: Recordings, angles: AngleTable | None
+    cable: CableContacts, recordings: Recordings, angles: AngleTable | None
 ) -> RunsTerm | WholeRecordingsTerm | LoopRecordingsTerm:
     """Return the term of a data set's recordings, used as its description says; those of a loop are always whole.
 
@@ -184,7 +184,7 @@ def _is_censored(settings: RecordingsTable, recordings: Recordings) -> bool:
     return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.items)
 
 
-def _run_label(cable: Cable, recordings: Recordings, run: str) -> str:
+def _run_label(cable: CableContacts, recordings: Recordings, run: str) -> str:
     """Return the name of a run, with its route value where it has just one and does not state it itself."""
     route, at = cable.description.route, {r.route for r in recordings.items if r.run == run}
     place = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""

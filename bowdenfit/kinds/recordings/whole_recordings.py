@@ -15,7 +15,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive, make_drive
 from bowdenfit.cable.sensors import BLOCK_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import (
@@ -158,7 +158,7 @@ class BlocksTerm(ABC):
         labels: Each run in words.
     """
 
-    cable: Cable = field(repr=False)
+    cable: CableContacts = field(repr=False)
     data: Data = field(repr=False)
     labels: tuple[str, ...] = field(repr=False)
     noise: str = RUN_SCATTER
@@ -403,7 +403,7 @@ class LoopRecordingsTerm(BlocksTerm):
 
 
 def make_loop_recordings_term(
-    cable: Cable, recordings: Recordings, angles: RowAngles, labels: tuple[str, ...], censored: bool
+    cable: CableContacts, recordings: Recordings, angles: RowAngles, labels: tuple[str, ...], censored: bool
 ) -> LoopRecordingsTerm:
     """Return the term of a loop's recordings.
 

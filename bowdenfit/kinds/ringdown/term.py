@@ -10,7 +10,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, IndependentReadings, Term, TermKind, Truth
@@ -90,7 +90,7 @@ class RingDownTerm(IndependentReadings):
         return at_rest[run] + jnp.where(data.torque[run] > 0, stiffness * angle + damping * speed, angle)
 
 
-def make_ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
+def make_ring_down_term(cable: CableContacts, table: RingDownTable) -> RingDownTerm:
     """Return the term of a table of ring-downs."""
     torque, swings = np.full(len(table.added), float(table.is_torque)), np.zeros(_sampling(table)[1])
     data = RingDownData(table.reading, table.time, table.run, table.added, torque, swings)
@@ -191,7 +191,7 @@ class RingDownTerms(TermKind[RingDownTable]):
     name = "ringdown"
 
     @override
-    def terms(self, cable: Cable, table: RingDownTable, angles: AngleTable | None) -> tuple[RingDownTerm]:
+    def terms(self, cable: CableContacts, table: RingDownTable, angles: AngleTable | None) -> tuple[RingDownTerm]:
         return (make_ring_down_term(cable, table),)
 
     @override

@@ -9,7 +9,7 @@ from jax import Array
 from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, StretchRows, spread_matrix
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
@@ -60,7 +60,7 @@ class StretchTerm(IndependentReadings):
         return self.cable.elasticity.stretch_of_rows(values, data)
 
 
-def make_stretch_term(cable: Cable, table: StretchTable) -> StretchTerm:
+def make_stretch_term(cable: CableContacts, table: StretchTable) -> StretchTerm:
     """Return the term of a table of stretch."""
     angles, at = np.unique(table.wrap_angle, return_inverse=True)
     # A row read while the load grew comes down from no larger one: the two branches meet there.
@@ -112,7 +112,7 @@ class StretchTerms(TermKind[StretchTable]):
     candidate = StretchCandidates()
 
     @override
-    def terms(self, cable: Cable, table: StretchTable, angles: AngleTable | None) -> tuple[StretchTerm]:
+    def terms(self, cable: CableContacts, table: StretchTable, angles: AngleTable | None) -> tuple[StretchTerm]:
         return (make_stretch_term(cable, table),)
 
     @override

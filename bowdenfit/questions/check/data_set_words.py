@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import Contact, Description, FrictionSetting
+from bowdenfit.description import ContactSettings, Description, FrictionSetting
 from bowdenfit.display import Block, Preformatted, Title, blocks_of, render_text, separate
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import AS_DECIMALS
@@ -213,7 +213,7 @@ def _count_conditions(measurements: Measurements) -> int:
     return len(set(rows))
 
 
-def _describe_angle_source(contact: Contact, description: Description) -> str:
+def _describe_angle_source(contact: ContactSettings, description: Description) -> str:
     """Describe what gives the wrap angle of a contact."""
     source = contact.wrap_angle
     if source.constant is not None:

@@ -11,7 +11,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from bowdenfit.description import Contact
+from bowdenfit.description import ContactSettings
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns
@@ -130,7 +130,7 @@ def read_rows(fit: Record, path: Path) -> StatedRows:
     )
 
 
-def _angle_names(contacts: tuple[Contact, ...] | list[Contact]) -> dict[str, int]:
+def _angle_names(contacts: tuple[ContactSettings, ...] | list[ContactSettings]) -> dict[str, int]:
     """Return the headings that mean the wrap angle of a contact: that of its column, or else its name."""
     names: dict[str, int] = {}
     for number, contact in enumerate(contacts):
@@ -220,7 +220,7 @@ def _predict_part(fit: Record, stated: StatedRows, part: slice) -> list[dict[str
     return rows
 
 
-def _slug(contact: Contact) -> str:
+def _slug(contact: ContactSettings) -> str:
     return "_".join(contact.name.lower().split())
 
 

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable
+from bowdenfit.cable.cable import ANGLE_NOISE, CableContacts
 from bowdenfit.cable.sensors import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.descriptions import design_without_recordings
@@ -152,7 +152,7 @@ def _collect_common_truth(recordings: Sequence[RecordingWithTruth]) -> dict[str,
 
 
 def _compute_true_angles(
-    plan: RecordingsPlan, cable: Cable, values: Mapping[str, jax.Array], lengths: np.ndarray
+    plan: RecordingsPlan, cable: CableContacts, values: Mapping[str, jax.Array], lengths: np.ndarray
 ) -> np.ndarray:
     """Return the wrap angle of each recording and contact [rad]: the curve's, or the stated one outside the range."""
     angles = np.array(cable.wrap_angles(values, jnp.asarray(np.nan_to_num(lengths))), dtype=float)

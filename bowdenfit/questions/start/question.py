@@ -10,7 +10,7 @@ from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from pydantic import TypeAdapter, ValidationError
 
-from bowdenfit.description import RESERVED_NAMES, Contact, Name
+from bowdenfit.description import RESERVED_NAMES, ContactSettings, Name
 from bowdenfit.description.file import PLACEHOLDERS
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, UsageError, suggest_name
 from bowdenfit.units import conversion_factor
@@ -288,7 +288,7 @@ def coefficient_name_question(words: str, default: str, columns: Collection[str]
 
     def read(typed: str) -> str:
         name = _read_name(typed)
-        _refuse_invalid(lambda: Contact.model_validate({"name": "x", "friction": name, "wrap_angle": {"column": "x"}}))
+        _refuse_invalid(lambda: ContactSettings.model_validate({"name": "x", "friction": name, "wrap_angle": {"column": "x"}}))
         of_curves = {f"{column}_{ending}" for column in columns for ending in _CURVE_PARAMETERS}
         if name in PARAMETER_NAMES or name in RESERVED_NAMES or name in of_curves or _RUN_PARAMETER.fullmatch(name):
             raise UsageError(

@@ -10,7 +10,7 @@ from cables import cable
 from raw_recordings import to_raw
 from scipy import integrate, stats
 
-from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.cable import CableContacts
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Preparation
 from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
@@ -66,7 +66,7 @@ def _at_each(term, points) -> np.ndarray:
 # Runs: the mounting effect integrates out -------------------------------------------------------------------------
 
 
-def _cable(**more) -> Cable:
+def _cable(**more) -> CableContacts:
     """A cable of one contact, whose wrap angle comes with the readings."""
     tables = {"recordings": {"files": "*.csv"}}
     description = cable(1, tables, contact=[CONTACT], reference_force=REFERENCE_FORCE, **more)
@@ -132,7 +132,7 @@ def _rows(seed: int, n: int, values, strokes=(1, -1), angles=(2.5,), m: float = 
     return replace(rows, output_force=force_in * np.exp(-stroke * ratio), log_ratio=ratio)
 
 
-def _runs_term(cable: Cable, rows: SlidingRows) -> RunsTerm:
+def _runs_term(cable: CableContacts, rows: SlidingRows) -> RunsTerm:
     return RunsTerm(cable, sum_runs(cable, rows), tuple(str(run) for run in np.unique(rows.run)))
 
 

@@ -169,11 +169,8 @@ def test_every_public_name_is_documented():
 def test_type_checkers_and_python_have_the_same_public_names():
     import bowdenfit
 
-    imports = [
-        node
-        for node in ast.walk(ast.parse(Path(bowdenfit.__file__).read_text()))
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("bowdenfit.") and node.col_offset == 4
-    ]
+    for_types = next(node for node in ast.parse(Path(bowdenfit.__file__).read_text()).body if isinstance(node, ast.If))
+    imports = [node for node in for_types.body if isinstance(node, ast.ImportFrom) and node.module != "typing"]
     names = {alias.asname: node.module for node in imports for alias in node.names if alias.name != "*"}
     assert names == bowdenfit._MODULES
 

@@ -31,6 +31,7 @@ _FAR_OFF = 0.2  # distance of a log ratio from the line beyond which a small gro
 _LEAST_FREEDOM = 4  # degrees of freedom from which distances estimate the noise; a judgement
 _YORK_STEPS = 20  # of a fixed-point iteration that gains a digit or more in each; a judgement
 _MEDIAN = 0.6745  # median size of a standard normal deviate
+ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one load; a judgement
 STROKE, SPEED, ORDER, ZERO = "Stroke", "Speed", "Order", "Zero"
 _MOST = 4000  # readings that are tested one by one; neighbors of more are joined, to bound the time. A judgement
 
@@ -272,9 +273,28 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     later = 2 * order / np.maximum(last - first, 1)[run] - 1
     drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}
     return {heading: column.numbers for heading, column in rows.unused.items()} | drifting | {
-        LOAD: rows.input_force,
+        LOAD: _loads(2 * run + (rows.stroke > 0), rows),
         STROKE: rows.stroke.astype(float),
         SPEED: np.abs(rows.velocity),
         ORDER: order,
         WRAP_ANGLE: np.rad2deg(own_angles.sum(axis=1)),
     }
+
+
+def _loads(stroke_of_run: Labels, rows: SlidingRows) -> Vector:
+    """Return the load of every reading: its input force, or the mean of a stroke that was made at one load.
+
+    It was if one of the forces hardly changes, such as under a hung weight: the other differs by friction and noise alone.
+    """
+    ranges = [range_by_group(force, stroke_of_run) for force in (rows.input_force, rows.output_force)]
+    at_one_load = np.minimum(*(high / low for low, high in ranges)) <= ONE_LOAD**2
+    mean = np.bincount(stroke_of_run, rows.input_force) / np.maximum(np.bincount(stroke_of_run), 1)
+    return np.where(at_one_load[stroke_of_run], mean[stroke_of_run], rows.input_force)
+
+
+def range_by_group(force: Vector, group: Labels) -> tuple[Float[np.ndarray, " groups"], Float[np.ndarray, " groups"]]:
+    """Return the lowest and the highest force of each group, numbered from 0."""
+    low, high = np.full(group.max() + 1, np.inf), np.zeros(group.max() + 1)
+    np.minimum.at(low, group, force)
+    np.maximum.at(high, group, force)
+    return low, high

@@ -22,14 +22,12 @@ from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_an
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
-from bowdenfit.kinds.sliding_rows import ExpectedForces, SlidingRows, expected_forces
+from bowdenfit.kinds.sliding_rows import ONE_LOAD, ExpectedForces, SlidingRows, expected_forces, range_by_group
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth, repeat_rows, spare_count
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.types import DataArray, Labels, Vector
-
-_ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one load; a judgement
 
 
 @jax.tree_util.register_dataclass
@@ -343,9 +341,9 @@ class ForceTerms(TermKind[ForceTable]):
             return {}
         runs, run = np.unique(term.rows.run, return_inverse=True)
         covariates = dict[str, np.ndarray]()
-        low, high = _range_in_runs(term.rows.input_force, run)
-        ends = (low, high), _range_in_runs(term.rows.output_force, run)
-        if np.all(high <= _ONE_LOAD * low) and all(most.max() > _ONE_LOAD**2 * least.min() for least, most in ends):
+        low, high = range_by_group(term.rows.input_force, run)
+        ends = (low, high), range_by_group(term.rows.output_force, run)
+        if np.all(high <= ONE_LOAD * low) and all(most.max() > ONE_LOAD**2 * least.min() for least, most in ends):
             covariates[LOAD] = (low + high) / 2
         if table.group:
             names = term.cable.friction.conditions.groups
@@ -363,11 +361,3 @@ class ForceTerms(TermKind[ForceTable]):
             heading: replace(column, numbers=np.bincount(run, column.numbers) / np.bincount(run))
             for heading, column in term.rows.unused.items()
         }
-
-
-def _range_in_runs(force: np.ndarray, run: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and the highest force of each run, numbered from 0."""
-    low, high = np.full(run.max() + 1, np.inf), np.zeros(run.max() + 1)
-    np.minimum.at(low, run, force)
-    np.maximum.at(high, run, force)
-    return low, high

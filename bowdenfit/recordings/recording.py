@@ -112,6 +112,8 @@ class Blocks:
             the saturated samples, and they must not be used as readings.
         input_turn: Input force [N] at which a block below both neighbors was lowest, or one above both highest, less what
             noise adds to extremes; of other blocks the mean. None in fits that were saved before it was kept.
+        finer: The same in shorter blocks, for what happens within a block or two after a turn; None where a block has too few
+            samples for that, and of forces that are not those that were read.
     """
 
     time: Vector
@@ -121,6 +123,7 @@ class Blocks:
     samples: Labels
     saturated: Flags
     input_turn: Vector | None = None
+    finer: "Blocks | None" = None
 
 
 @dataclass(frozen=True)

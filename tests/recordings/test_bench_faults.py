@@ -77,6 +77,14 @@ def test_a_healthy_bench_has_no_fault(usual, seed):
     assert find_bench_fault(recording(RecordedBench(length=60, **usual), seed)) is None
 
 
+@pytest.mark.parametrize(("exponent", "crosstalk"), [(0.1, 0.0), (0.3, 0.05)])
+def test_few_blocks_after_a_reversal_are_not_taken_for_crosstalk(exponent, crosstalk):
+    """Of a rope that sticks for a block or two, so that the next one holds both sticking and sliding."""
+    bench = RecordedBench(rate=220, length=42, period=0.872, wave="trapezoid", exponent=exponent, correlated=0.01, delay=0.02)
+    fault = find_bench_fault(recording(replace(bench, crosstalk=crosstalk), 81))
+    assert (fault.kind if fault else "") == ("crosstalk" if crosstalk else "")
+
+
 @pytest.mark.parametrize("stiffness", [10.0, 25.0])
 @pytest.mark.parametrize("exponent", [0.2, 0.4])
 def test_a_rope_that_creeps_is_no_crosstalk_and_crosstalk_is_no_creep(stiffness, exponent):

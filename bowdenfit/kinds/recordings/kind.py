@@ -312,7 +312,7 @@ class RecordingKind(FrictionKind[Recordings]):
         for recording in table.items:
             force = error.apply_to_force(recording.blocks.output_force, recording.strokes.contact)
             angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
-            items.append(replace(recording, own_angle=angle, blocks=replace(recording.blocks, output_force=force)))
+            items.append(replace(recording, own_angle=angle, blocks=replace(recording.blocks, output_force=force, finer=None)))
         return replace(table, items=tuple(items))
 
     @override

@@ -368,7 +368,8 @@ def replace_forces(description: Description, recordings: Recordings, readings: M
         n, time = len(recording.blocks.time), recording.blocks.time
         shown, error = readings["output_force"][:n, i], readings["output_error"][:n, i]
         late = shown - float(readings["delay_error"]) * np.gradient(shown, time)
-        blocks = replace(recording.blocks, input_force=readings["input_force"][:n, i], output_force=late + error)
+        force_in = readings["input_force"][:n, i]
+        blocks = replace(recording.blocks, input_force=force_in, output_force=late + error, finer=None)
         strokes = _find_strokes_again(description, recording, blocks)
         items.append(replace(recording, blocks=blocks, strokes=strokes))
     return replace(recordings, items=tuple(items))

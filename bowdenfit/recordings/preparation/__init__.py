@@ -14,6 +14,7 @@ from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import pieces
 from bowdenfit.recordings.preparation.blocks import (
+    FINER,
     CommonClock,
     average_blocks,
     choose_block_samples,
@@ -177,6 +178,8 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
     samples = _samples_of_block(inspected, common, bandwidth, main, noise)
     blocks, counts = average_blocks(common, samples, noise[0])
+    if samples >= FINER:
+        blocks = replace(blocks, finer=average_blocks(common, samples // FINER, noise[0])[0])
     account = Account(
         counts=counts,
         samples=len(common.time),

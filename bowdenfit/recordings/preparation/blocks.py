@@ -18,6 +18,7 @@ from bowdenfit.types import ChosenVector, Flags, Labels, OtherVector, Positions,
 
 MOST_PARTS = 8  # judged: of one long recording; 2000 cycles say far more of a mounting than mountings scatter
 MOST_BLOCKS = 4000  # judged: the play operator is a loop over them in every step of a sampler
+FINER = 4  # finer blocks to a usual one
 FEWEST_BLOCKS = 200  # judged: that are left, where the recording has as many samples
 _NOISE_IN_BAND = 0.1  # judged: noise of a mean over half the friction band
 _BLOCKS_OF_PERIOD, _LEAST_OF_PERIOD = 16, 11  # judged: blocks that show a stroke each way, usually and at the least

@@ -72,6 +72,8 @@ _COMMON_UNITS = {
 }
 _WEIGHTS = {"kg": "kgf", "g": "gf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf", "oz": "ozf"}
 _PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm", "newton": "N", "newtons": "N"}
+# As engineers write torques without a sign between; to pint Nm is a number of yarn.
+_TORQUES = {"Nm": "N*m", "Nmm": "N*mm", "Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m"}
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _UNIT_TEXT = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
 _MULTIPLE = re.compile(r"[x×*]? ?(?P<factor>10+) ?[x×*]? ?(?P<unit>[^\W\d].*)")  # (x10 N), (100 N)
@@ -234,7 +236,7 @@ def _parsed(unit: str) -> "pint.Unit":
     unknown = f"the unit {shown(unit)} is not known; use one such as N, lbf, mm, inch, deg, rad, %"
     if text in {"1", "-", ""}:
         text = "dimensionless"
-    text = _DEGREE.sub("deg", _PINT_NAMES.get(text.lower(), text))
+    text = _DEGREE.sub("deg", _PINT_NAMES.get(text.lower(), _TORQUES.get(text, text)))
     if _DEGREE_OR_GON.search(text):
         raise DatasetError(
             f"the unit {shown(unit)} is a degree in German and a hundredth of a right angle elsewhere; write deg, or gradian"

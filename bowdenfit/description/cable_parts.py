@@ -138,6 +138,11 @@ class ContactSettings(Frozen):
         return "" if self.law == type(self).model_fields["law"].default else self.law
 
 
+def radius_setting(end: str) -> str:
+    """Return the argument of --set that states the radius of the pulley at one end, "input" or "output", as an example."""
+    return f'cable.{end}_pulley_radius={{value=15,unit="mm"}}'
+
+
 @dataclass(frozen=True)
 class Pulleys:
     """Radii of the pulleys at the motor and at the load side [mm]; None if not stated."""
@@ -155,7 +160,8 @@ class Pulleys:
         if radius is None:
             raise DatasetError(
                 f"{file} gives {end}_torque, but the radius of that pulley is not known; add it to cable.toml: [cable] "
-                f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}.'
+                f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}; or for a file by itself, '
+                f"--set '{radius_setting(end)}'."
             )
         return torques / radius
 

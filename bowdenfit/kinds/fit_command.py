@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bowdenfit.description.cable_parts import radius_setting
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.headings import find_candidates, heading_of, split_brackets
 from bowdenfit.files.pivot import find_pivot_headings
@@ -172,7 +173,9 @@ def _name_forces(
     best = remaining[: len(missing)]
     best = best if in_order else sorted(best, key=lambda column: -column.mean)  # a pulled cable loses force
     ends |= dict(zip(missing, best, strict=False))
-    provided = [f"{shown(ends[name].name)} is the {name}" for name in missing if name in ends]
+    provided = [
+        f"{shown(ends[name].name)} is the {name}" for name in missing if name in ends and not _measures(ends[name], "torque")
+    ]
     if provided and len(remaining) > len(best):
         also = listed([shown(column.name) for column in remaining[len(best) :][:_MOST_NAMED]])
         provided[-1] += f" rather than {also}"
@@ -185,7 +188,11 @@ def _name_forces(
     options = []
     for name in [name for name in unnamed if name not in multiples]:
         unit = weight_of(ends[name].written_unit) or ("" if ends[name].written_unit else "N")
-        if always or unit or name not in sure:
+        if _measures(ends[name], "torque"):
+            end = name.removesuffix("_force")
+            options += [(option, _naming(f"{end}_torque", ends[name].name)), ("--set", radius_setting(end))]
+            provided.append(f"{shown(ends[name].name)} is the torque of a pulley of 15 mm at the {end}")
+        elif always or unit or name not in sure:
             options.append((option, _naming(name, ends[name].name, unit)))
     if any(not column.written_unit for name, column in ends.items() if name not in multiples):
         provided.append("the forces are in newtons, as the file does not state")
@@ -193,7 +200,7 @@ def _name_forces(
 
 
 def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]:
-    """Return the columns that can be forces, the likeliest first: in units of force, of weight, none, of signals.
+    """Return the columns that can be forces, the likeliest first: in units of force, of weight, of torque, none, of signals.
 
     Args:
         columns: Columns of numbers.
@@ -201,14 +208,20 @@ def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]
     """
     units = {column.name: column.written_unit for column in columns}
     measured = [column for column in columns if not (_SPREAD.search(column.name) or column.is_index)]
-    of_force = [column for column in measured if is_unit(units[column.name]) and dimension_of(units[column.name]) == "force"]
+    of_force = [column for column in measured if _measures(column, "force")]
+    of_torque = [column for column in measured if _measures(column, "torque")]
     of_weight = [column for column in measured if weight_of(units[column.name])]
     without_unit = [column for column in measured if not units[column.name]]
     signals = [column for column in measured if units[column.name] and column.dimension in ("", "other", "ratio")]
     likely = list[FileColumn]()
-    for group in (of_force, of_weight, without_unit, [column for column in signals if column not in of_weight]):
+    for group in (of_force, of_weight, of_torque, without_unit, [column for column in signals if column not in of_weight]):
         likely += group if len(likely) < least else []
     return likely
+
+
+def _measures(column: FileColumn, dimension: str) -> bool:
+    """Return whether a column states a unit of a dimension, such as "force"."""
+    return is_unit(column.written_unit) and dimension_of(column.written_unit) == dimension
 
 
 def make_ambiguity_error(file: LoneFile) -> DatasetError:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bowdenfit.description.cable_parts import Pulleys
+from bowdenfit.description.cable_parts import Pulleys, radius_setting
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import YEARS, is_clock
-from bowdenfit.files.headings import find_candidates, option_naming, rank_headings, unit_to_state
+from bowdenfit.files.headings import find_candidates, heading_of, option_naming, rank_headings, unit_to_state
 from bowdenfit.files.pieces import have_same_numbers
 from bowdenfit.recordings.named_channels import (
     OUTPUT_CLOCK,
@@ -303,6 +303,13 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
         return DatasetError(f"{has} {other}")
     name, below = headings[likely[0]]
     unit = unit_to_state(name, below, "N")
+    unit_there = heading_of(name, below).unit
+    if is_unit(unit_there) and dimension_of(unit_there) == "torque":
+        end = quantity.removesuffix("_force")
+        return DatasetError(
+            f"{has} If {shown(name)} is the torque of the pulley at the {end}, name it and state the radius: "
+            f"{option_naming(f'{end}_torque', name, '', '--channel')} --set '{radius_setting(end)}'. {other}"
+        )
     in_toml = f'name = "{name}"' + (f', unit = "{unit}"' if unit else "")
     return DatasetError(
         f"{has} Say which it is and its unit: {option_naming(quantity, name, unit, '--channel')}, or channels = "

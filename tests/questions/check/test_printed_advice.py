@@ -1,5 +1,7 @@
 """What a refusal advises is right: done as it says, the data are read, and give the friction they were made with."""
 
+import shlex
+
 import numpy as np
 import pytest
 
@@ -118,3 +120,16 @@ def test_a_gain_that_splits_pull_from_return_is_named_before_friction_that_diffe
     assert text.index("sensors.output_gain_error_sd=0.1") < text.index("--friction stroke-dependent")
     settings = ["sensors.input_gain_error_sd=0.1", "sensors.output_gain_error_sd=0.1"]
     assert coefficient(path, wrap_angle="180deg", settings=settings) == pytest.approx(MU, rel=0.03)
+
+
+@pytest.mark.parametrize("unit", ["Nm", "Ncm", "N*m", "mNm"])
+def test_a_torque_is_proposed_as_one_with_the_radius_of_its_pulley(tmp_path, run, unit):
+    per_newton = 0.015 / {"Ncm": 0.01, "mNm": 0.001}.get(unit, 1.0)  # at 15 mm, as the command states
+    stroke, force_in, force_out = pulls_and_returns(1.0)
+    path = write(tmp_path, f"stroke,Motor torque ({unit}),output_force_N", stroke, force_in * per_newton, force_out)
+    code, text, _ = run("check", path)
+    assert code == 2
+    printed = text.partition("To fit it once that is corrected:\n")[2].partition("This assumes")[0]
+    command = shlex.split(printed.replace("\\\n", " "))
+    assert run(*command[1:], "--no-mcmc", "--no-figures", "-o", tmp_path / "fit")[0] == 0
+    assert bf.load(tmp_path / "fit").least_squares.estimates["mu"].value == pytest.approx(MU, rel=0.02)

@@ -1,0 +1,1 @@
+"""The parts of scripts/check_tracking.py: a simulator of benches, and Kalman filters of a textbook."""

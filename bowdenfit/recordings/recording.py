@@ -80,6 +80,8 @@ class Account:
         limits: Lowest and highest force taken for the ends of the range [N]; infinite where no clipping was seen.
         flagged: Samples left out.
         remarks: Remarks for the user, in sentences.
+        sample_sd: Standard deviation of the noise of a sample without the motion, input and output [N]; 0 in older fits.
+        noise_time: Correlation times of that noise [s]; 0 for white noise.
         clock_shift: Of two loggers, what brings the times of the output's to those of the input's, the delay included [s].
     """
 
@@ -96,6 +98,8 @@ class Account:
     limits: tuple[float, float]
     flagged: FlaggedSamples
     remarks: tuple[str, ...]
+    sample_sd: tuple[float, float] = (0.0, 0.0)
+    noise_time: tuple[float, float] = (0.0, 0.0)
     clock_shift: float | None = None
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import isotonic_regression
-from scipy.signal import savgol_filter
+from scipy.signal import lfilter, savgol_filter
 
 import bowdenfit as bf
 from bowdenfit.description import ForceLimits, Preparation, QuantityValue
@@ -28,6 +28,7 @@ from bowdenfit.recordings.preparation.flags import flag_frozen, flag_samples, re
 from bowdenfit.recordings.preparation.hysteresis import play
 from bowdenfit.recordings.preparation.noise import (
     correlation_time,
+    describe_noise,
     estimate_tare,
     noise_about_trend,
     noise_of,
@@ -484,6 +485,27 @@ def test_the_noise_is_found_in_spite_of_motion_and_spikes():
     assert noise_of(force) == pytest.approx(0.5, rel=0.03)
     assert noise_about_trend(smooth + white, 50) == pytest.approx(0.5, rel=0.03)
     assert quantum_of(quantised(force)) == pytest.approx(RANGE / 4096)
+
+
+@pytest.mark.parametrize("load", [1.0, 1e4])
+@pytest.mark.parametrize("correlation", [0.0, 5.0, 20.0])
+def test_noise_that_a_filter_has_smoothed_has_its_deviation_and_its_memory(load, correlation):
+    """RC filters of 5 and 20 ms at 1 kHz, on a sine and on triangles."""
+    generator, time = np.random.default_rng(2), np.arange(60_000) / 1000
+    noise = generator.standard_normal(len(time))
+    if correlation:
+        decay = np.exp(-1 / correlation)
+        noise = lfilter([np.sqrt(1 - decay**2)], [1, -decay], noise)
+    for motion in (np.cos(2 * np.pi * time / 5), np.abs(time / 3 % 2 - 1)):
+        sd, samples = describe_noise(load * (motion + 0.005 * noise))
+        assert sd == pytest.approx(0.005 * load, rel=0.15)
+        assert samples == pytest.approx(correlation, rel=0.3)
+
+
+def test_motion_without_noise_and_series_that_are_short_have_no_memory():
+    sd, samples = describe_noise(np.cos(np.arange(20_000) / 800))
+    assert sd < 1e-6 and samples == 0.0
+    assert describe_noise(np.zeros(5000)) == describe_noise(np.zeros(20)) == (0.0, 0.0)
 
 
 def test_the_correlation_time_of_a_moving_average_is_its_length():

@@ -36,7 +36,7 @@ from bowdenfit.recordings.preparation.clock import (
 )
 from bowdenfit.recordings.preparation.delay import BEYOND, RANGE, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
-from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_trend
+from bowdenfit.recordings.preparation.noise import describe_noise, estimate_tare, noise_about_trend
 from bowdenfit.recordings.preparation.shift_scan import OVERLAP, LateOutput, ShiftScan, scan_shifts
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Flags, Vector
@@ -176,6 +176,7 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
     main = main_frequency(filled[0], filled[1], 1 / common.step)
     bandwidth = estimate_bandwidth(filled[0], filled[1], 1 / common.step, main, raw.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
+    sample_sds, noise_times = zip(_describe_noise(cleaned.input), _describe_noise(cleaned.output), strict=True)
     samples = _samples_of_block(inspected, common, bandwidth, main, noise)
     blocks, counts = average_blocks(common, samples, noise[0])
     if samples >= FINER:
@@ -194,6 +195,8 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
         limits=cleaned.limits,
         flagged=_flagged(common),
         remarks=(*remarks, *_remarks(cleaned, delay, counts)),
+        sample_sd=sample_sds,
+        noise_time=noise_times,
     )
     return blocks, account
 
@@ -349,6 +352,12 @@ def _noise(channel: Sampled, bandwidth: float) -> float:
     """Return the standard deviation of a single sample, from the channel on its own clock [N]."""
     stretch = max(4, round(1 / (2 * bandwidth * step_of(channel.time))))
     return noise_about_trend(pieces.Filled(channel.force, channel.fault == GOOD), stretch)
+
+
+def _describe_noise(channel: Sampled) -> tuple[float, float]:
+    """Return the noise of a sample without the motion [N] and its correlation time [s]."""
+    sd, samples = describe_noise(pieces.Filled(channel.force, channel.fault == GOOD))
+    return sd, samples * step_of(channel.time)
 
 
 def _samples_of_block(

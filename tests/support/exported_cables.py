@@ -1,5 +1,6 @@
 """Cables as tables, made up for tests of what is exported, and what the package's own equations say of them."""
 
+import types
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import numpy as np
 from bowdenfit.physics.friction import force_from_scale, force_scale, play_operator, rate_factor
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
 from bowdenfit.physics.presliding import presliding_operator
+from bowdenfit.questions.export.python import python_module
 from bowdenfit.questions.export.tables import (
     DRAW,
     LEVELS,
@@ -51,6 +53,13 @@ def cable(case: str, draws: int = 3, name: str = "test cable") -> TransmissionTa
     )
     speed = (20.0, "mm/s") if case in ("rate", "lugre") else (0.0, "")
     return TransmissionTables(about, places, tuple(levels), case == "loop", options, 50.0, *speed, 1e-6)
+
+
+def module_of(tables: TransmissionTables) -> types.ModuleType:
+    """The exported module, loaded."""
+    module = types.ModuleType("exported_cable")
+    exec(compile(python_module(tables), "exported_cable.py", "exec"), module.__dict__)
+    return module
 
 
 def with_rope(

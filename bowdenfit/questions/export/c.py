@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from bowdenfit.questions.export.sensors import SensorErrors
 from bowdenfit.questions.export.tables import TransmissionTables
 from bowdenfit.questions.export.text import ascii_text, fill_template, format_comment
 
@@ -41,7 +42,7 @@ def c_header(tables: TransmissionTables) -> str:
         law=fill_template("loop.h" if tables.is_loop else "rope.h"),
         of_turns=int(tables.builds_up),
         motion=_format_motion(tables),
-        track="" if tables.is_loop else fill_template("track.h"),
+        track=fill_template("track.h", sensors=_format_sensors(tables.sensors)),
     )
 
 
@@ -50,6 +51,12 @@ def _format_motion(tables: TransmissionTables) -> str:
     if not tables.builds_up:
         return fill_template("step.h")
     return fill_template("creep.h", presliding=_format_tuples([level.presliding for level in tables.levels]))
+
+
+def _format_sensors(sensors: SensorErrors) -> str:
+    """Return standard deviations as the estimator takes them; NAN where they must be stated."""
+    values = (sensors.force_sd, sensors.noise_time, sensors.gain_sd, sensors.zero_sd, sensors.latency_sd)
+    return ", ".join("NAN" if np.isnan(value) else repr(float(value)) for value in values)
 
 
 def format_hexadecimal(values: Iterable[float], before: str) -> str:

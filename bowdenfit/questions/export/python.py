@@ -1,7 +1,10 @@
 """A module of plain Python with the same tables and answers as the C header."""
 
+import math
 from collections.abc import Iterable
+from dataclasses import asdict
 
+from bowdenfit.questions.export.sensors import SensorErrors
 from bowdenfit.questions.export.tables import FrictionLevel, TransmissionTables
 from bowdenfit.questions.export.text import ascii_text, fill_template, format_comment
 
@@ -28,7 +31,15 @@ def python_module(tables: TransmissionTables) -> str:
         reference_speed=repr(float(tables.reference_speed)),
         places=_format_numbers(points.values, "    "),
         varies=bool(points.unit),
+        sensors=_format_sensors(tables.sensors),
         levels="\n".join(_format_level(level) for level in tables.levels),
+    )
+
+
+def _format_sensors(sensors: SensorErrors) -> str:
+    """Format what is known of the sensors as entries of a dictionary."""
+    return ", ".join(
+        f'"{name}": {"math.nan" if math.isnan(value) else repr(float(value))}' for name, value in asdict(sensors).items()
     )
 
 

@@ -29,6 +29,7 @@ from bowdenfit.models import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.bent_cable import BentCable, find_bent_contact, has_stretch
+from bowdenfit.questions.export.sensors import SensorErrors, estimate_sensors
 from bowdenfit.questions.predict.measured_range import find_measured_range
 from bowdenfit.results.record import Record
 
@@ -132,6 +133,7 @@ class TransmissionTables:
         speed_unit: "mm/s" or "rad/s"; empty where friction does not depend on speed.
         interpolation_error: Largest error of the median exponent between two places [1].
         radii: Radii of the pulleys at the motor and at the load side [mm]; 0 where none is stated.
+        sensors: What an online estimator assumes of the sensors.
     """
 
     about: FitLabel
@@ -144,6 +146,7 @@ class TransmissionTables:
     speed_unit: str
     interpolation_error: float
     radii: tuple[float, float] = (0.0, 0.0)
+    sensors: SensorErrors = field(default_factory=SensorErrors)
 
     @property
     def median(self) -> FrictionLevel:
@@ -229,6 +232,7 @@ def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distru
         conditions.velocity_unit or "mm/s" if cable.friction.depends_on_rate else "",
         _measure_interpolation_error(np.median(mean_tables["effective"][:, 0], axis=0)),
         _pulley_radii(fit),
+        estimate_sensors(fit),
     )
 
 

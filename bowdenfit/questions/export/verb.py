@@ -76,7 +76,7 @@ VERB = Verb(
     cable's mean and of any one mounting.
 
       c       a header (C99): output force, input force, friction while moving to
-              and fro, compensation; of a rope also friction followed online
+              and fro, compensation, and friction followed online
       mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch
               is known as a callback (--output cable.py)
       matlab  a function for MATLAB and Octave with the same answers

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from exported_cables import HOSTILE, cable
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
+from bowdenfit.questions.export.sensors import estimate_sensors
 from bowdenfit.questions.export.tables import LEVELS, tabulate_transmission
 from bowdenfit.questions.export.text import ascii_text
 from bowdenfit.questions.export.writers import draws_table
@@ -91,6 +93,22 @@ def test_every_file_says_fit_seed_version_and_range(fit, tmp_path):
         text = bf.export(fit, to, tmp_path / f"file.{ending}", points=3).file.read_text()
         made = f"seed {fit.provenance.seed}", f"bowdenfit {fit.provenance.versions['bowdenfit']}"
         assert all(words in text for words in ("On-body knee exoskeleton", *made, "430 to 530 mm"))
+
+
+def test_the_estimator_gets_the_sensors_that_description_and_recordings_tell(fit, on_body, tmp_path):
+    sensors = tabulate_transmission(fit, points=2).sensors
+    assert np.isnan(sensors.force_sd) and sensors.noise_time == 0.0  # a table does not tell the noise of a sample
+    assert sensors.gain_sd == pytest.approx(np.sqrt(2) * 0.01) and sensors.latency_sd == 0.01
+    text = bf.export(fit, "c", tmp_path / "cable.h", points=3).file.read_text()
+    assert "bowden_fitted_sensors = {NAN, 0.0, 0.0141" in text
+    recorded = SimpleNamespace(dataset=bf.read(on_body.with_name("synthetic-recordings")))
+    sensors = estimate_sensors(recorded)
+    assert sensors.force_sd == pytest.approx(0.5, rel=0.1) and sensors.noise_time == 0.0  # truth.json
+    sheet = {"gain_sd": 0.003, "offset_sd": SimpleNamespace(to=lambda _: 0.2), "force_noise": None}
+    description = SimpleNamespace(sensors=SimpleNamespace(**sheet), errors=SimpleNamespace(gain=0.01), route=None)
+    dataset = SimpleNamespace(description=description, measurements=recorded.dataset.measurements)
+    sensors = estimate_sensors(SimpleNamespace(dataset=dataset))
+    assert (sensors.gain_sd, sensors.zero_sd) == (0.003, 0.2)
 
 
 def test_the_command_writes_a_file_and_does_not_replace_one(fit, of_load, tmp_path, run, refuse, monkeypatch):

@@ -326,6 +326,18 @@ def reserve_folder(folder: Path | None) -> Iterator[None]:
             folder.rmdir()
 
 
+def remove_empty_results(folder: Path) -> None:
+    """Remove a results folder in which a fit that was ended had written nothing but its lock; any other stays.
+
+    Args:
+        folder: The folder, which may be missing, and which nobody writes into meanwhile.
+    """
+    with suppress(OSError):
+        if not folder.is_symlink() and {path.name for path in folder.iterdir()} == {_LOCK}:
+            (folder / _LOCK).unlink()
+            folder.rmdir()
+
+
 def _missing_folders(folder: Path) -> list[Path]:
     """Return a folder and those around it that do not exist, the inner ones first."""
     return [path for path in (folder, *folder.parents) if not os.path.lexists(path)]

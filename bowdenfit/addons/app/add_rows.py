@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from bowdenfit.addons.app.elements import address, block, button, link, text
+from bowdenfit.addons.app.elements import address, block, button, link, report, text
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.new_rows import CheckedRows, OpenTable, list_tables, open_table
 from bowdenfit.addons.app.sheet import MORE_ROWS, CellGrid
@@ -79,7 +79,7 @@ class AddRowsPage:
                     button(f"Add {counted(checked.count, 'row')}", lambda: attempt(self._save), "primary", key="add-rows")
                 if checked.report:
                     with section("How it was read with them", "understood"):
-                        text(checked.report, "pre", tabindex="0")
+                        report(checked.report)
 
     async def _save(self) -> None:
         """Add the rows, and show the data set.

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -18,6 +19,7 @@ from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.display import blocks_of, render_html
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
+from bowdenfit.pages.section import PageSection
 from bowdenfit.questions import export as export_room
 from bowdenfit.questions import next as next_room
 from bowdenfit.questions.export.verb import Target, export
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from bowdenfit.addons.app.dials import Dial
     from bowdenfit.finished_fit import Fit
 
+ARRIVES, STOP = "What arrives", "Measure more, or stop"  # headings
 _THROTTLE = 0.1  # s between two positions of a dial that is moved; a judgement
 _WAYS = (("in", "at the motor; find the load force"), ("out", "at the load; find the motor force"))
 _STROKES = (("pull", "pulling"), ("return", "returning"))
@@ -108,7 +111,7 @@ class ArrivingForce:
 
 def show_arriving(workbench: Workbench, fit: "Fit") -> None:
     """Show what arrives at a length or bend, of a fit with draws."""
-    with section("What arrives", "arriving"):
+    with section(ARRIVES, "arriving"):
         if fit.sampled is None:
             text("This fit has no posterior, because it was made without MCMC; fit again for intervals.")
         else:
@@ -130,7 +133,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
             text("Ranking what could be measured ...")
         try:
             ranking = await workbench.compute(bf.next_measurement, fit)
-            words = render_section(next_room.ranking_section(ranking), {})
+            words = render_section(_stop_first(next_room.ranking_section(ranking), ranking.stop), {})
         except BowdenfitError as error:
             place.clear()
             with place:
@@ -141,7 +144,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
             markup(words, "div", id="ranking")
 
     data_set = workbench.data_set_of(fit, name)
-    with section(next_room.TITLE, "next"):
+    with section(STOP, "next"):
         with block("div", role="status") as place:
             button("Rank what could be measured next", rank)
         if data_set:
@@ -151,6 +154,12 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
                 link("Live: fit again after each mounting", address("live", data_set), "button")
         else:
             text("The data set of this fit is missing or has changed; open it at the start to add what was measured.")
+
+
+def _stop_first(advice: PageSection, stop: str) -> PageSection:
+    """Return the advice with what it says of stopping above all, as the heading asks."""
+    others = tuple(sentence for sentence in advice.context["sentences"] if sentence != stop)
+    return replace(advice, context={**advice.context, "headline": stop, "sentences": others})
 
 
 def show_files(name: str) -> None:

@@ -16,11 +16,13 @@ from bowdenfit.addons.app.elements import (
     field,
     link,
     markup,
+    report,
     session_root,
     text,
     text_input,
 )
 from bowdenfit.addons.app.frame import NAME, attempt, frame, notify, refused, section
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.sheet import FILE as TYPED
 from bowdenfit.addons.app.sheet import TypedSheet
 from bowdenfit.addons.app.workbench import KeptFit, Workbench, refuse_folder_name, refuse_module_name
@@ -46,12 +48,29 @@ def show_start(workbench: Workbench) -> None:
     """Show what lies in the folder, and what can be brought."""
     with frame(NAME):
         text(f"Friction of a Bowden cable from what was measured on its bench. Everything stays in {workbench.folder}.")
-        with section("Add measurements", "bring"):
-            with block("div", "row"):
-                button("New data set", lambda: ui.navigate.to(address("new", workbench.new_draft().key)), "primary")
-            _show_examples(workbench)
+        with section("Add measurements", "bring"), block("div", "beginning"):
+            with block("ul", "ways"):
+                _show_ways(workbench)
+            with block("figure", "bench-figure"):
+                markup(_BENCH, "div")
+                text("What is measured: the force at both ends of the cable, and how far it is bent.", "figcaption")
         _show_data_sets(workbench)
         _show_fits(workbench)
+
+
+def _show_ways(workbench: Workbench) -> None:
+    """Show how a data set begins: with files or a typed table, with an example, or with a folder that has a cable.toml."""
+    with block("li"):
+        text("Measured files, or a table to type", "h3")
+        text("Tables, workbooks and recordings as your bench wrote them; what they do not say is asked.")
+        with block("div", "row"):
+            button("New data set", lambda: ui.navigate.to(address("new", workbench.new_draft().key)), "primary")
+    with block("li"):
+        text("An example", "h3")
+        _show_examples(workbench)
+    with block("li"):
+        text("A folder that has a cable.toml", "h3")
+        text(f"Copy it into {workbench.folder}, and load this page again.")
 
 
 def _show_examples(workbench: Workbench) -> None:
@@ -66,7 +85,7 @@ def _show_examples(workbench: Workbench) -> None:
             ui.navigate.to(address("data", chosen["name"]))
 
     with block("div", "row"):
-        with field("Or copy an example", "example"):
+        with field("Copied into the folder", "example"):
             choice("example", examples[0], [(name, name) for name in examples], lambda name: chosen.update(name=name))
         button("Copy the example", take)
 
@@ -94,7 +113,7 @@ def _show_fits(workbench: Workbench) -> None:
         return
     with section("Fits", "fits"):
         if sum(fit.finished for fit in fits) > 1:
-            link("Two cables side by side", "/compare")
+            link("Compare two fits", "/compare")
         _show_fit_cards(fits, running)
 
 
@@ -189,7 +208,7 @@ def _show_understanding(workbench: Workbench, draft: Draft, understanding: Under
         text(f"Left out, because the contents are not what the extension says: {names}.", classes="hint")
     if understanding.report:
         with section("How it was read", "understood"):
-            text(understanding.report, "pre", tabindex="0")
+            report(understanding.report)
         _show_writing(workbench, draft)
 
 
@@ -265,7 +284,7 @@ def _show_refused_rows(file: str, refusals: list[Refusal]) -> None:
                         for heading, cell in refusal.cells:
                             text(cell or "blank", "td", "wrong" if heading == refusal.column else "")
                     with block("tr"), block("td", "left", colspan=str(len(refusal.cells) + 1)):
-                        text(refusal.sentence, "p", "fault")
+                        text(page_words(refusal.sentence), "p", "fault")
 
 
 def _show_questions(draft: Draft, understanding: Understanding, look_again: Again) -> None:
@@ -283,7 +302,8 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
             text(_BENCH_WORDS, "figcaption")
         for number, entry in enumerate(understanding.entries):
             key = f"question-{number}"
-            with field(entry.words, key, entry.hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
+            hint = "" if entry.key in draft.answers and not entry.fault else entry.hint
+            with field(entry.words, key, hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
                 if entry.options:
                     options = entry.options if entry.answer else (("", "choose one"), *entry.options)
                     choice(key, entry.answer, options, partial(answer, entry.key))

@@ -4,6 +4,7 @@ from nicegui import ui
 
 from bowdenfit.addons.app.add_rows import show_table_links
 from bowdenfit.addons.app.elements import address, block, button, field, link, text, text_input
+from bowdenfit.addons.app.elements import report as show_report
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
@@ -97,4 +98,4 @@ class DataSetPage:
             if refusal:
                 refused(refusal)
             else:
-                text(report, "pre", tabindex="0")
+                show_report(report)

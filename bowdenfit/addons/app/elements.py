@@ -8,6 +8,7 @@ from urllib.parse import quote, urlencode
 from nicegui import ui
 from nicegui.element import Element
 
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.words import printable, unbroken
 
 _VALUE = "event => emit(event.target.value)"
@@ -56,6 +57,11 @@ def _set_attributes(element: Element, classes: str, attributes: Mapping[str, str
         element.props[name.rstrip("_").replace("_", "-")] = value
 
 
+def report(printed: str) -> ui.html:
+    """Return an element with what a command reports, line by line, in the words of a page."""
+    return text(page_words(printed), "pre", tabindex="0")
+
+
 def button(words: str, on_click: Callable[..., Any], classes: str = "", key: str = "", **attributes: str) -> Element:
     """Return a button."""
     made = text(words, "button", classes, type="button", data_key=key or words, **attributes)
@@ -88,9 +94,9 @@ def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
         text(label, "label", for_=key)
         slot = block("div")
         if fault:
-            text(fault, "p", "fault", id=f"{key}-fault", role="alert")
+            text(page_words(fault), "p", "fault", id=f"{key}-fault", role="alert")
         if hint:
-            text(hint, "p", "hint", id=f"{key}-hint")
+            text(page_words(hint), "p", "hint", id=f"{key}-hint")
     return slot
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.child_process import python_command, safe_environment
+from bowdenfit.results.folder import CHAIN, FIT, remove_empty_results
 
 _PATIENCE = 5.0  # s, in which a process ends after it was told; a judgement
 
@@ -66,6 +67,11 @@ class FitJob:
         return self._ended is None
 
     @property
+    def is_void(self) -> bool:
+        """Whether it was cancelled before sampling, so that its folder holds nothing of a fit."""
+        return self.cancelled and not self.running and not any((self.request.output / name).exists() for name in (CHAIN, FIT))
+
+    @property
     def seconds(self) -> float:
         """How long it has run."""
         return (time.monotonic() if self._ended is None else self._ended) - self._began
@@ -84,15 +90,18 @@ class FitJob:
     def _follow(self) -> None:
         """Read the lines of the process until it ends."""
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            with suppress(ValueError):
-                self._take(json.loads(line))
+        with self._process.stdout as lines:
+            for line in lines:
+                with suppress(ValueError):
+                    self._take(json.loads(line))
         code = self._process.wait()
         if self.trusted is None and not self.refusal and not self.cancelled:
             self.refusal = (
                 f"The fit ended without an answer (exit code {code}); the usual cause is too little memory. Close other "
                 "programs, and resume it."
             )
+        if self.cancelled:
+            remove_empty_results(self.request.output)
         self._ended = time.monotonic()
 
     def _take(self, line: dict[str, Any]) -> None:

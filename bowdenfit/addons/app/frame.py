@@ -9,6 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from bowdenfit.addons.app.elements import block, link, session_root, text
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_assets
 
@@ -64,13 +65,14 @@ def section(heading: str, name: str) -> Iterator[None]:
 def refused(sentence: str) -> None:
     """Show why something was not done."""
     with block("div", "verdict bad", role="alert"):
-        for line in sentence.splitlines():
+        for line in page_words(sentence).splitlines():
             text(line)
 
 
 def notify(sentence: str) -> None:
     """Show a sentence over the page for a while."""
-    ui.notify(sentence, position="bottom", multi_line=True, timeout=8000, close_button="Close", classes="note-over-page")
+    words = page_words(sentence)
+    ui.notify(words, position="bottom", multi_line=True, timeout=8000, close_button="Close", classes="note-over-page")
 
 
 async def attempt(action: Callable[[], Any]) -> bool:

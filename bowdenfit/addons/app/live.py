@@ -9,6 +9,7 @@ from nicegui import ui
 
 from bowdenfit.addons.app.elements import address, block, button, field, markup, text, text_input
 from bowdenfit.addons.app.frame import attempt, frame, section
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.pages.page import render_section
@@ -128,10 +129,10 @@ class LivePage:
         self._known.clear()
         with self._known:
             if bench.refusal:
-                text(bench.refusal, "p", "fault", role="alert")
+                text(page_words(bench.refusal), "p", "fault", role="alert")
             markup(words, "div", id="history")
             with section("As the command line prints it", "lines"):
-                text(bench.printed, "pre", tabindex="0", role="log", id="printed")
+                text(page_words(bench.printed), "pre", tabindex="0", role="log", id="printed")
 
 
 def _render_history(bench: WatchedBench) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from bowdenfit.addons.app.ask import show_arriving, show_files, show_next
-from bowdenfit.addons.app.elements import address, block, button, choice, field, markup, session_root, text
+from bowdenfit.addons.app.ask import ARRIVES, STOP, show_arriving, show_files, show_next
+from bowdenfit.addons.app.elements import address, block, button, choice, field, link, markup, session_root, text
 from bowdenfit.addons.app.fit_job import FitJob
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.workbench import Workbench
@@ -18,6 +18,7 @@ from bowdenfit.pages.page import render_section
 from bowdenfit.questions import next as next_room
 from bowdenfit.questions import report as report_room
 from bowdenfit.questions.summary.verb import reply, summary
+from bowdenfit.results.folder import CHAIN
 from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.verb import Reply
 
@@ -81,6 +82,10 @@ class FitPage:
     def _show_job(self, job: FitJob) -> None:
         """Show a fit that runs, or why it ended without an answer."""
         if not job.running:
+            if job.is_void:
+                text("It was cancelled before sampling, and nothing of it is kept.", role="status")
+                self._show_way_back(job)
+                return
             if job.refusal:
                 refused(job.refusal)
             elif job.cancelled:
@@ -97,8 +102,15 @@ class FitPage:
             text("It goes on if this page is closed; what is sampled is kept.", classes="hint")
         self._running, self._answered = ((stage, progress, clock), job), job.trusted is not None
 
+    def _show_way_back(self, job: FitJob) -> None:
+        """Show the way to the data set of a fit of which nothing is kept."""
+        names = self._workbench.data_sets()
+        if name := next((name for name in names if self._workbench.data_set(name) == job.request.dataset), ""):
+            with block("div", "row"):
+                link(f"Back to {self._workbench.title_of(name)}", address("data", name), "button")
+
     def _show_interrupted(self) -> None:
-        """Show how an interrupted fit goes on."""
+        """Show how an interrupted fit goes on, or how one without draws is started again."""
         names, job = self._workbench.data_sets(), self._workbench.jobs.get(self._name)
         if not names:
             text("Its data set is no longer in this folder.")
@@ -118,7 +130,8 @@ class FitPage:
                 options = [(one, self._workbench.title_of(one)) for one in names]
                 choice("data-set", likely, options, lambda one: chosen.update(name=one))
             with block("div", "row"):
-                button("Resume", lambda: start(True), "primary")
+                if (self._workbench.results(self._name) / CHAIN).is_file():
+                    button("Resume", lambda: start(True), "primary")
                 button("Start over", lambda: start(False))
 
 
@@ -131,6 +144,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
     folder = workbench.results(name)
     try:
         printed = await workbench.compute(_read_summary, folder)
+        contents = block("div", id="contents")
         with block("div", "columns-of-page"):
             with block("div") as left, section("The answer", "answer"):
                 answer = _show_text(printed)
@@ -156,10 +170,23 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         show_files(name)
     with right, section(report_room.FIGURES_TITLE, "figures"):
         markup(pictures, "div")
+    parts = [(heading, f"part-{heading.lower().replace(' ', '-')}", html) for heading, html in others]
+    with contents:
+        _show_contents([(heading, key) for heading, key, _ in parts])
     with below:
-        for heading, html in others:
-            with section(heading, f"part-{heading.lower().replace(' ', '-')}"):
+        for heading, key, html in parts:
+            with section(heading, key):
                 markup(html, "div")
+
+
+def _show_contents(parts: list[tuple[str, str]]) -> None:
+    """Show links to the parts of the page, as (heading, key)."""
+    figures = (report_room.FIGURES_TITLE, "figures")
+    first = (("The answer", "answer"), (ARRIVES, "arriving"), (STOP, "next"), ("Files", "kept-files"), figures)
+    with block("nav", aria_label="On this page"), block("ul", "links"):
+        for heading, key in (*first, *parts):
+            with block("li"):
+                link(heading, f"#{key}")
 
 
 def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str) -> list[Any]:

@@ -9,6 +9,7 @@ from nicegui.element import Element
 
 from bowdenfit.addons.app.draft import Draft, Refusal
 from bowdenfit.addons.app.elements import block, button, text, text_input
+from bowdenfit.addons.app.page_words import page_words
 
 FILE = "typed.csv"
 _HEADINGS = ("input_force_N", "output_force_N", "run", "stroke", "wrap_angle_deg", "")
@@ -81,7 +82,7 @@ class CellGrid:
             faults: Why, by number of the row in `cells` and heading.
         """
         for (row, column), made in self._inputs.items():
-            sentence = faults.get((row, self.cells[0][column].strip()), "")
+            sentence = page_words(faults.get((row, self.cells[0][column].strip()), ""))
             if sentence != made.props.get("title", ""):
                 made.props["aria-invalid"], made.props["title"] = str(bool(sentence)).lower(), sentence
                 made.update()

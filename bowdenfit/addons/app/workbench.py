@@ -131,7 +131,8 @@ class Workbench:
         Raises:
             UsageError: There is none of that name.
         """
-        if name not in self.jobs and name not in {fit.name for fit in self.fits()}:
+        job = self.jobs.get(name)
+        if (job is None or job.is_void) and name not in {fit.name for fit in self.fits()}:
             raise UsageError(f"there is no fit {shown(name)} in {self.folder.name} any more; go back to the start.")
         return self.folder / FITS / name
 
@@ -139,7 +140,8 @@ class Workbench:
         """Return the name of a data set, or with a number behind it, that no fit has yet."""
         title = self.title_of(name)
         names = [title, *(f"{title}-{number}" for number in range(2, 1000))]
-        return next(free for free in names if not (self.folder / FITS / free).exists() and free not in self.jobs)
+        taken = {name for name, job in self.jobs.items() if not job.is_void}
+        return next(free for free in names if not (self.folder / FITS / free).exists() and free not in taken)
 
     def start_fit(self, name: str, data_set: str, seed: int | None = None, resume: bool = False, force: bool = False) -> FitJob:
         """Start a fit, or go on with one.

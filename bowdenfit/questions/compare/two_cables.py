@@ -62,9 +62,7 @@ def contrast_cables(one: Record, other: Record, names: tuple[str, str]) -> TwoCa
     Raises:
         UsageError: They share measurements, one has no draws, or they have nothing in common.
     """
-    first, second = (dict(_files(fit)) for fit in (one, other))
-    shared = [name for name, checksum in first.items() if checksum in second.values()]
-    if shared:
+    if shared := shared_files(one, other):
         raise UsageError(
             f"both fits are of {listed(shared)}, whose errors they share, so that their difference is not that of two cables; "
             "bowdenfit compare says which of two models of the same measurements predicts better."
@@ -76,6 +74,12 @@ def contrast_cables(one: Record, other: Record, names: tuple[str, str]) -> TwoCa
     charts = _efficiency_charts(one, other, names)
     charts = charts or tuple(_density_chart(quantity, draws, names) for quantity, draws in pairs.items())
     return TwoCables(names, tuple(contrasts), charts)
+
+
+def shared_files(one: Record, other: Record) -> list[str]:
+    """Names of the measured files that two fits share."""
+    first, second = (dict(_files(fit)) for fit in (one, other))
+    return [name for name, checksum in first.items() if checksum in second.values()]
 
 
 def _files(fit: Record) -> Iterator[tuple[str, str]]:

@@ -110,7 +110,7 @@ def test_two_cables_stand_side_by_side_and_a_bench_is_watched(chromium, tmp_path
         bf.fit(tmp_path / name, output=tmp_path / "fits" / name, seed=1, figures=False)
     with served(tmp_path) as app, visiting(chromium, app) as visit:
         page = visit.page
-        page.get_by_role("link", name="Two cables side by side").click()
+        page.get_by_role("link", name="Compare two fits").click()
         page.locator("#comparison .uplot").wait_for()
         assert "new minus worn" in page.inner_text("#comparison")
         assert "different (higher) with probability" in page.inner_text("#comparison")

@@ -1,0 +1,36 @@
+"""A fit that is cancelled before it samples leaves nothing that claims to be a fit."""
+
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+from bowdenfit.addons.app.workbench import Workbench
+from bowdenfit.errors import UsageError
+
+DATASETS = Path(__file__).parents[3] / "datasets"
+
+
+def wait_for(condition):
+    """Wait until something is so, for a minute at most."""
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_a_fit_cancelled_before_sampling_leaves_no_folder_and_no_name(tmp_path):
+    shutil.copytree(DATASETS / "yarn-on-cylinder", tmp_path / "bench" / "yarn")
+    (tmp_path / "scratch").mkdir()
+    workbench = Workbench(tmp_path / "bench", tmp_path / "scratch")
+    folder = tmp_path / "bench" / "fits" / "yarn"
+    job = workbench.start_fit("yarn", "yarn", seed=1)
+    wait_for(folder.is_dir)
+    job.cancel()
+    wait_for(lambda: not job.running)
+    assert job.is_void
+    assert (workbench.fits(), folder.exists(), workbench.free_name("yarn")) == ([], False, "yarn")
+    with pytest.raises(UsageError, match="there is no fit 'yarn'"):
+        workbench.results("yarn")
+    workbench.close()

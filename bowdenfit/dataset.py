@@ -243,6 +243,8 @@ def read_dataset(
             measurements = Measurements((*measurements.tables, read.table), (*measurements.remarks, *remarks))
             accounts += read.accounts
             checksums |= {name: _sha256(path) for name, path in read.files.items()}
+    if excluded := description.tables.describe_excluded():
+        measurements = Measurements(measurements.tables, (excluded, *measurements.remarks))
     faults.refuse()
     if channels and not any(kind.takes_channels for kind, _ in iterate_tables(measurements)):
         raise DescriptionError(

@@ -1,12 +1,15 @@
 """What a description says of measurements: tables, whose kinds add settings of their own, and recordings."""
 
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from bowdenfit.description.values import Code, Finite, Frozen, Name, QuantityValue
+from bowdenfit.description.values import Code, Finite, Frozen, Name, QuantityValue, Text
 from bowdenfit.units import ChannelSource, ColumnSource, conversion_factor
+from bowdenfit.words import counted, listed
 
+_MOST_EXCLUDED = 1000  # rows, and entries that name them; a judgement
 MOST_FILES = 1000  # judged: of a table, or recordings of a cable; each takes some 20 ms or more to read
 
 
@@ -26,13 +29,22 @@ class TableSettings(Frozen):
         return False
 
 
+class ExcludedRows(Frozen):
+    """Rows of a file that its user leaves out, by their numbers in the file, and why."""
+
+    rows: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1, max_length=_MOST_EXCLUDED)]
+    reason: Annotated[Text, Field(min_length=1)]
+    file: str | None = None
+
+
 class Table(TableSettings):
-    """One table: its file or files, the sheet or sheets of a workbook, and columns that do not carry the usual names."""
+    """One table: its file or files, the sheet or sheets of a workbook, columns without the usual names, and rows left out."""
 
     file: str | None = None
     files: str | tuple[str, ...] | None = None
     sheet: str | tuple[str, ...] | None = None
     columns: dict[str, ColumnSource] = Field(default_factory=dict)
+    exclude: Annotated[tuple[ExcludedRows, ...], Field(max_length=_MOST_EXCLUDED)] = ()
 
     @model_validator(mode="after")
     def _one_source(self) -> "Table":
@@ -42,7 +54,17 @@ class Table(TableSettings):
             raise ValueError('write either file = "name.csv" or files = "folder/*.csv"')
         if self.sheet in ("", ()):
             raise ValueError('the title of the sheet is empty; write sheet = "Sheet1", or leave it out')
+        if self.exclude and isinstance(self.sheet, tuple) and len(self.sheet) > 1:
+            raise ValueError("exclude names rows of one sheet; put the sheets into files of their own to leave rows out")
+        if self.file is None and not isinstance(self.files, str) and any(part.file is None for part in self.exclude):
+            raise ValueError('exclude must say of which file its rows are, { file = "name.csv", rows = [7], reason = "..." }')
         return self
+
+    def describe_excluded(self) -> Iterator[str]:
+        """Yield which rows are left out and why, such as "forces.csv, rows 7 and 9 (the rope jumped)"."""
+        for part in self.exclude:
+            rows = listed([str(row) for row in sorted(set(part.rows))])
+            yield f"{part.file or self.file or self.files}, row{'s' * (len(set(part.rows)) > 1)} {rows} ({part.reason})"
 
 
 class Tables(Frozen):
@@ -58,6 +80,14 @@ class Tables(Frozen):
     def stated(self) -> dict[str, Any]:
         """What is said of each table that there is, by the name of its kind."""
         return {name: settings for name in type(self).model_fields if (settings := getattr(self, name)) is not None}
+
+
+    def describe_excluded(self) -> str:
+        """Return how many readings the user leaves out, which, and why, in a sentence; empty where all are used."""
+        tables = [settings for settings in self.stated.values() if isinstance(settings, Table)]
+        count = sum(len(set(part.rows)) for settings in tables for part in settings.exclude)
+        places = "; ".join(place for settings in tables for place in settings.describe_excluded())
+        return f"{counted(count, 'reading')} left out by the user: {places}." if count else ""
 
 
 class ForceLimits(Frozen):

@@ -7,6 +7,8 @@ from bowdenfit.words import few, shown
 
 BLANK, COMMENT, ABOVE, BELOW = "blank", "a comment", "above the headings", "below the table"
 BETWEEN, AGAIN = "a remark between the rows", "the headings again"
+BY_USER = "left out by the user: "
+"""Begins the reason of rows that a description leaves out, of which it says so itself."""
 _USUAL = (BLANK, COMMENT)  # reasons that nobody needs to hear of where nothing else is left out
 _RANGES, _TEXTS = 4, 3  # that are named
 
@@ -69,7 +71,8 @@ class RowAccount:
     @property
     def remarks(self) -> list[str]:
         """What is said of rows whose loss may matter, in sentences."""
-        sentences = [f"{self.file}, {group.words}; not used." for group in self.left_out if group.why not in _USUAL]
+        unusual = [group for group in self.left_out if group.why not in _USUAL and not group.why.startswith(BY_USER)]
+        sentences = [f"{self.file}, {group.words}; not used." for group in unusual]
         sentences += [f"{self.file}, {self.beside_in_words}; not used."] * bool(self.beside)
         return sentences + [f"{self.file}: {self.note}."] * bool(self.note)
 

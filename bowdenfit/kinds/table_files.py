@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from bowdenfit.description import MOST_FILES, Description
-from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
 from bowdenfit.files.columns import Column, Quantity, find_columns
+from bowdenfit.files.excluded_rows import leave_out_rows
 from bowdenfit.files.merged_cells import fill_merged_cells
 from bowdenfit.files.missing_codes import MissingCodes, leave_out_coded_rows
-from bowdenfit.files.row_account import RowAccount
+from bowdenfit.files.row_account import BY_USER, RowAccount
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.inputs import match_files
 from bowdenfit.units import ColumnSource
+from bowdenfit.words import shown
 
 AnyTable = TypeVar("AnyTable")
 
@@ -108,7 +110,31 @@ class Source:
         codes = MissingCodes(self.settings.missing)
         table = codes.mark(read_table(path, sheet=sheet))
         table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)
+        table, columns = leave_out_rows(table, columns, self._find_excluded(path))
         return leave_out_coded_rows(table, columns, wanted, codes)
+
+    def _find_excluded(self, path: Path) -> dict[int, str]:
+        """Return why each of the rows of a file is left out that its user excludes, by number.
+
+        Raises:
+            DescriptionError: It is not clear of which file they are, or the table has no file of that name.
+        """
+        names = {self.name_of(file) for file in self.files}
+        excluded: dict[int, str] = {}
+        for part in self.settings.exclude:
+            if part.file is None and len(names) > 1:
+                raise DescriptionError(
+                    f"cable.toml, tables.{self.kind}, exclude: the table has {len(names)} files; say of which the rows are, "
+                    f'such as {{ file = "{min(names)}", rows = {list(part.rows)}, reason = "..." }}.'
+                )
+            if part.file is not None and part.file not in names:
+                raise DescriptionError(
+                    f"cable.toml, tables.{self.kind}, exclude: the table has no file {shown(part.file)}"
+                    f"{suggest_name(part.file, sorted(names))}"
+                )
+            if part.file in (None, self.name_of(path)):
+                excluded |= dict.fromkeys(part.rows, f"{BY_USER}{part.reason}")
+        return excluded
 
     def name_of(self, path: Path) -> str:
         """Return a file's path as seen from the folder."""

@@ -60,12 +60,13 @@ def summary_blocks(fit: Record, purpose: Purpose = "design") -> list[Block]:
     """
     (answer, verdict), outliers = _sentences(fit, purpose), _outlier_blocks(fit)
     fit_verdict = assess_for(fit, purpose)
-    room = LINES - _count_lines([*answer, *verdict]) - _OTHER_LINES
+    excluded = [sentence for sentence in [fit.dataset.description.tables.describe_excluded()] if sentence]
+    room = LINES - _count_lines([*answer, *verdict, *excluded]) - _OTHER_LINES
     shown, complete = _quantity_blocks(fit, room - _count_lines(outliers))
     if not complete and fit_verdict.trusted and not fit_verdict.doubts:  # that all readings agree is said above already
         longer, complete = _quantity_blocks(fit, room + 1)
         shown, outliers = (longer, []) if complete else (shown, outliers)
-    below = separate(shown, outliers, [_MORE])
+    below = separate(shown, [*excluded, *outliers], [_MORE])
     room = LINES - _count_lines(below) - 1
     further = interval_width_caveat(fit) if fit_verdict.trusted else ""
     if further and _count_lines([*answer, *verdict, further]) <= room:

@@ -9,6 +9,7 @@
   const shown = value => typeof value === "string" ? value : String(Number(value.toPrecision(4)));
   const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
   const font = () => `${Math.round(0.8 * rem())}px system-ui, sans-serif`;
+  const padded = (low, high) => { const room = 0.04 * (high - low) || 0.1 * Math.abs(low) || 1; return [low - room, high + room]; };
   const isBar = one => one.look === "from" || one.look === "to";
 
   function seriesOf(chart) {
@@ -131,7 +132,9 @@
       const tables = chart.groups.map(group => [group.x, ...group.series.map(one => one.values)]);
       const data = uPlot.join(tables, tables.map(table => table.map(() => 1)));
       const named = chart.names.length > 0, counts = data[0].every(Number.isInteger);
+      const picked = chart.groups.some(group => group.series.some(one => one.keys));
       this.ends = named ? [0.5, chart.names.length + 0.5] : [data[0][0], data[0].at(-1)];
+      if (picked) this.ends = padded(...this.ends); // no point lies on the edge
       const axis = label => ({ label, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid }, font: font(), labelFont: font() });
       const bands = series.flatMap((one, i) => one.look === "low" ? [{ series: [i + 2, i + 1], fill: color(one.color) + Math.round(255 * BAND).toString(16) }] : []);
       this.addKey(chart, series);
@@ -150,7 +153,8 @@
           setScale: [(plot, name) => { if (name === "x") this.box.dataset.shown = `${plot.scales.x.min} ${plot.scales.x.max}`; }],
         },
       }, data, this.area);
-      if (named) this.whole();
+      if (named || picked) this.whole();
+      if (picked) this.plot.over.addEventListener("click", event => this.pick(event, chart));
     }
 
     addKey(chart, series) {
@@ -176,6 +180,7 @@
 
     read(plot, series) {
       const at = plot.cursor.idx, found = new Map();
+      const bands = new Set(series.filter(one => !["points", "hollow"].includes(one.look)).map(one => one.label));
       if (at != null) {
         const x = plot.data[0][at], { names } = this.charts[this.current];
         found.set(this.charts[this.current].x, [names.length ? names[x - 1] : x]);
@@ -189,8 +194,21 @@
       }
       for (const [label, cell] of this.values) {
         const values = found.get(label);
-        cell.textContent = !found.has(label) ? "" : values === null ? "here" : values.map(shown).join(" to ");
+        cell.textContent = !found.has(label) ? "" : values === null ? "here" : values.map(shown).join(bands.has(label) ? " to " : ", ");
       }
+    }
+
+    // A point that is clicked says what it is called; whoever made the page may listen.
+    pick(event, chart) {
+      const box = this.plot.over.getBoundingClientRect(), [left, top] = [event.clientX - box.left, event.clientY - box.top];
+      let nearest = NEAR, key = null;
+      for (const group of chart.groups)
+        for (const one of group.series.filter(one => one.keys))
+          group.x.forEach((x, i) => {
+            const away = one.values[i] == null ? Infinity : Math.hypot(this.plot.valToPos(x, "x") - left, this.plot.valToPos(one.values[i], "y") - top);
+            if (away < nearest) [nearest, key] = [away, one.keys[i]];
+          });
+      if (key) this.box.dispatchEvent(new CustomEvent("pick", { bubbles: true, detail: key }));
     }
 
     size() {

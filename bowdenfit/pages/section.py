@@ -23,12 +23,19 @@ class Series:
         look: "low" and "high", one after the other, are the edges of a band, and "from" and "to" the ends of upright bars.
         color: One of the page's colors, such as "blue".
         values: At the places of their group; not finite where there are none.
+        keys: What each point is called in events of a page, when it is clicked; empty where nothing listens.
     """
 
     label: str
     look: Look
     color: str
     values: np.ndarray
+    keys: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """For the page's script."""
+        page = vars(self) | {"values": _round_numbers(self.values)}
+        return page if self.keys else {name: value for name, value in page.items() if name != "keys"}
 
 
 @dataclass(frozen=True)
@@ -90,7 +97,7 @@ class Chart:
             "groups": [
                 {
                     "x": _round_numbers(group.x, _X_DIGITS),
-                    "series": [vars(series) | {"values": _round_numbers(series.values)} for series in group.series],
+                    "series": [series.to_json() for series in group.series],
                 }
                 for group in self.groups
             ],

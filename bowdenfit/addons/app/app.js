@@ -13,6 +13,16 @@
     }
     return refusals;
   };
+  // A point of a chart that is clicked shows its row; both have the same key.
+  document.addEventListener("pick", event => {
+    const row = document.querySelector(`[data-row-key="${CSS.escape(event.detail)}"]`);
+    if (!row) return;
+    document.querySelectorAll("tr.picked").forEach(other => other.classList.remove("picked"));
+    row.classList.add("picked");
+    for (let part = row.parentElement; part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true;
+    row.scrollIntoView({ block: "center" });
+    row.focus({ preventScroll: true });
+  });
   let last = null;
   document.addEventListener("focusin", event => { last = event.target.dataset?.key ?? null; });
   const tidy = () => {

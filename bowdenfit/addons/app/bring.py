@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 from nicegui import ui
 
+from bowdenfit.addons.app.data_charts import sketch_file
 from bowdenfit.addons.app.draft import Draft, Refusal, Understanding
 from bowdenfit.addons.app.elements import (
     address,
@@ -16,12 +17,12 @@ from bowdenfit.addons.app.elements import (
     field,
     link,
     markup,
-    report,
     session_root,
     text,
     text_input,
 )
 from bowdenfit.addons.app.frame import NAME, attempt, frame, notify, refused, section
+from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.sheet import FILE as TYPED
 from bowdenfit.addons.app.sheet import TypedSheet
@@ -29,6 +30,8 @@ from bowdenfit.addons.app.workbench import KeptFit, Workbench, refuse_folder_nam
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
 from bowdenfit.kinds.lone_file import FileColumn
+from bowdenfit.pages.page import render_section
+from bowdenfit.pages.section import prose_section
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
 from bowdenfit.questions.start.measured_file import MeasuredFile
 from bowdenfit.units import usual_units
@@ -146,7 +149,7 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
             if draft.is_arriving:
                 text("Files are on their way.")
                 return
-            _show_understanding(workbench, draft, understanding, look_again)
+            await _show_understanding(workbench, draft, understanding, look_again)
         sheet.mark(understanding.refusals)
 
     draft.is_arriving = False  # a page that was closed while it sent files never says that they all arrived
@@ -182,7 +185,7 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
     zone.on("drop", taken, js_handler=f"async event => emit(await sendFiles(event.dataTransfer.files, '{target}'))")
 
 
-def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
+async def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
     """Show what is understood of a draft, and what is asked."""
     if not (draft.files or draft.is_described):
         text("Nothing is here yet.")
@@ -193,6 +196,8 @@ def _show_understanding(workbench: Workbench, draft: Draft, understanding: Under
             _remove_button(draft, DESCRIPTION_FILE, look_again)
     for file in understanding.files:
         _show_file(draft, file, look_again)
+        if not understanding.description and (sketch := sketch_file(file)) is not None:
+            markup(render_section(prose_section("", (), pictures=(sketch,)), {}), "div")
     for path in [path for path in draft.files if path.name not in {file.name for file in understanding.files}]:
         with block("div", "row"):
             text(path.relative_to(draft.folder).as_posix(), "h3", dir="auto")
@@ -206,10 +211,16 @@ def _show_understanding(workbench: Workbench, draft: Draft, understanding: Under
     if understanding.left_out:
         names = listed([shown(name) for name in understanding.left_out])
         text(f"Left out, because the contents are not what the extension says: {names}.", classes="hint")
-    if understanding.report:
+    if understanding.checked is not None:
         with section("How it was read", "understood"):
-            report(understanding.report)
-        _show_writing(workbench, draft)
+            show_checked(understanding.checked)
+    if understanding.description:
+        with section("What was measured", "measured"):
+            place = block("div")
+        if understanding.checked is not None:
+            _show_writing(workbench, draft)
+        with place:
+            await MeasuredView(workbench, draft.folder).show(understanding.refusals)
 
 
 def _remove_button(draft: Draft, name: str, look_again: Again) -> None:

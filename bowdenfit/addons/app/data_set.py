@@ -1,11 +1,13 @@
-"""The page of a data set: how `check` understands it, and the button that fits it."""
+"""The page of a data set: what was measured, how `check` understands it, and the button that fits it."""
 
 from nicegui import ui
 
 from bowdenfit.addons.app.add_rows import show_table_links
+from bowdenfit.addons.app.description_edit import exclude_row, include_row
+from bowdenfit.addons.app.draft import list_refusals
 from bowdenfit.addons.app.elements import address, block, button, field, link, text, text_input
-from bowdenfit.addons.app.elements import report as show_report
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
 from bowdenfit.errors import BowdenfitError, UsageError
@@ -50,7 +52,7 @@ class DataSetPage:
             with section("Add what was measured", "add"), block("div", "row"):
                 show_table_links(workbench, name)
                 link("Live: fit again after each mounting", address("live", name), "button")
-            with section("How it was read", "understood"):
+            with section("What was measured", "understood"):
                 self._place = block("div", aria_live="polite")
         with self._place:
             text("Reading ...")
@@ -87,15 +89,29 @@ class DataSetPage:
         ui.navigate.to(address("fit", self._fit_name))
 
     async def _look(self) -> None:
-        """Show what `check` says."""
-        folder = self._workbench.data_set(self._name)
+        """Show what `check` says, and what was measured."""
+        folder, report, error = self._workbench.data_set(self._name), None, None
         try:
-            report, refusal = str(await self._workbench.compute(check, folder)), ""
-        except BowdenfitError as error:
-            report, refusal = "", str(error)
+            report = await self._workbench.compute(check, folder)
+        except BowdenfitError as caught:
+            error = caught
         self._place.clear()
         with self._place:
-            if refusal:
-                refused(refusal)
-            else:
-                show_report(report)
+            if report is not None:
+                show_checked(report)
+            elif error is not None:
+                refused(str(error))
+            await MeasuredView(self._workbench, folder, self._change_row).show(list_refusals(error) if error else ())
+
+    async def _change_row(self, kind: str, file: str, row: int, reason: str | None) -> None:
+        """Leave a row out with a reason, or take it in again without one; and look at the data set anew.
+
+        Raises:
+            UsageError, DescriptionError, StoreError: cable.toml cannot be changed so.
+        """
+        folder = self._workbench.data_set(self._name)
+        if reason is None:
+            await self._workbench.compute(include_row, folder, kind, file, row)
+        else:
+            await self._workbench.compute(exclude_row, folder, kind, file, row, reason)
+        await self._look()

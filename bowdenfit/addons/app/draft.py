@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bowdenfit.addons.app.brought_folder import lay_flat, put_in_place
 from bowdenfit.addons.app.form import Form, FormEntry, UnansweredError
@@ -21,6 +22,9 @@ from bowdenfit.questions.start.describe import describe_measured_files, inspect_
 from bowdenfit.questions.start.folder import copy_data_set, refuse_existing, refuse_files, write_data_set
 from bowdenfit.questions.start.measured_file import MeasuredFile
 from bowdenfit.words import printable, shown
+
+if TYPE_CHECKING:
+    from bowdenfit.questions.check.data_set_words import Report
 
 _LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
 _FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
@@ -56,6 +60,7 @@ class Understanding:
         refusals: Why it cannot be fitted yet.
         description: Text of its cable.toml; empty where questions are open.
         report: Report of `check`; empty where it cannot be fitted.
+        checked: The same as it was checked; None where it cannot be fitted.
         left_out: Files that the data set will not have, because their contents are not what their extension says.
     """
 
@@ -65,6 +70,7 @@ class Understanding:
     description: str = ""
     report: str = ""
     left_out: tuple[str, ...] = ()
+    checked: "Report | None" = None
 
 
 @dataclass
@@ -151,7 +157,7 @@ class Draft:
         lay_flat(self.folder)
         if self.is_described:
             return self._understand_description()
-        form, measured_files, description, report = Form(self.answers), list[MeasuredFile](), "", ""
+        form, measured_files, description, checked = Form(self.answers), list[MeasuredFile](), "", None
         refusals: tuple[Refusal, ...] = ()
         try:
             refuse_files(self.files)
@@ -160,26 +166,30 @@ class Draft:
             if measured_files:
                 description = describe_measured_files(measured_files, _cable_name(measured_files), form)
                 write_text(self.folder / DESCRIPTION_FILE, description)
-                report = str(check(self.folder))
+                checked = check(self.folder)
         except UnansweredError:
             pass
         except BowdenfitError as error:
             refusals = add_cells(list_refusals(error), self.files)
-        self.understanding = Understanding(tuple(measured_files), tuple(form.entries), refusals, description, report)
+        report = str(checked) if checked is not None else ""
+        self.understanding = Understanding(
+            tuple(measured_files), tuple(form.entries), refusals, description, report, checked=checked
+        )
         return self.understanding
 
     def _understand_description(self) -> Understanding:
         """Return what `check` says of files that were brought with their own cable.toml."""
-        description, report, refusals, left_out = "", "", tuple[Refusal, ...](), tuple[str, ...]()
+        description, checked, refusals, left_out = "", None, tuple[Refusal, ...](), tuple[str, ...]()
         try:
             refuse_files(self.files)
             self.cable = put_in_place(self.folder).name
             left_out = tuple(path.name for path in self.files if not _is_measured(path))
-            report = str(check(self.folder))
+            checked = check(self.folder)
             description = (self.folder / DESCRIPTION_FILE).read_text(encoding="utf-8-sig")
         except BowdenfitError as error:
             refusals = add_cells(list_refusals(error), self.files)
-        self.understanding = Understanding((), (), refusals, description, report, left_out)
+        report = str(checked) if checked is not None else ""
+        self.understanding = Understanding((), (), refusals, description, report, left_out, checked)
         return self.understanding
 
     def _state_columns(self, measured_files: Sequence[MeasuredFile]) -> None:

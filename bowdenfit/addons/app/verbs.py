@@ -14,7 +14,7 @@ from bowdenfit.arguments import HIDDEN, PATH, read_first
 from bowdenfit.errors import BowdenfitError, UsageError, describe_unforeseen, system_error
 from bowdenfit.verb import Reply, Verb
 
-_LIBRARIES = {"nicegui", "fastapi", "uvicorn"}  # of the extra
+_LIBRARIES = {"nicegui", "fastapi", "uvicorn", "tomlkit"}  # of the extra
 
 
 @read_first

@@ -66,8 +66,8 @@ class OverTime:
         stroke: +1 pulling, -1 returning, 0 switching or held.
         saturated: Blocks at the end of a load cell's range.
         predicted: Output force [N] of each block that the cable gives at the measured input force, 5 %, 50 % and 95 %
-            quantiles (first axis) over draws and over new mountings; one row, least squares', without draws.
-        fitted: Output force [N] of each block with this run's own mounting effect.
+            quantiles (first axis) over draws and over new mountings; one row, least squares', without draws; none before a fit.
+        fitted: Output force [N] of each block with this run's own mounting effect; empty before a fit.
         flagged_kind, flagged_time, flagged_input, flagged_output: Samples left out: why, when [s], and what was read [N].
     """
 
@@ -297,10 +297,11 @@ def _series(recording: OverTime, broken: Callable[[np.ndarray], np.ndarray]) -> 
     predicted = [broken(row) for row in recording.predicted]
     if len(predicted) == 1:
         yield Series(f"Output predicted, {LEAST_SQUARES.lower()}", "dashed", "blue", predicted[0])
-    else:
+    elif predicted:
         yield Series(f"Output predicted, {WIDE_INTERVAL}", "low", "blue", predicted[0])
         yield Series(f"Output predicted, {WIDE_INTERVAL}", "high", "blue", predicted[-1])
-    yield Series("Output fitted", "line", "vermillion", broken(recording.fitted))
+    if len(recording.fitted):
+        yield Series("Output fitted", "line", "vermillion", broken(recording.fitted))
 
 
 def _left_out_group(recording: OverTime) -> Iterator[SeriesGroup]:

@@ -5,7 +5,8 @@ leverage (Cook and Weisberg, Residuals and Influence in Regression, 1982, equati
 only where a curve lies above the lowest detected one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -45,20 +46,44 @@ def leave_one_out_errors(route: Route, lengths: Vector, angles: Vector) -> Mappi
         }
 
 
-def _errors(curve: Curve, lengths: Vector, angles: Vector) -> Vector:
-    """Error of each detected angle's prediction from the others [rad]."""
+def fit_curve(route: Route, family: str, lengths: Vector, angles: Vector, at: Vector) -> Vector:
+    """Wrap angle [rad] of the least-squares curve of a family at some lengths; readings outside the range are left out.
+
+    Args:
+        route: Route variable and its range.
+        family: Name of the family.
+        lengths, angles: See `propose_curve`; some angles are detected.
+        at: Lengths to draw the curve at.
+    """
+    inside = (lengths >= route.range[0]) & (lengths <= route.range[1])
+    with jax.enable_x64(True):
+        curve: Curve = load_class(CURVES[family].place)("angle", route)
+        best, values_at = _fit(curve, lengths[inside], angles[inside])
+        return np.asarray(curve.wrap_angle(values_at(best.x), jnp.asarray(at)))
+
+
+def _fit(curve: Curve, lengths: Vector, angles: Vector) -> tuple[Any, Callable[[Vector], dict[str, jax.Array]]]:
+    """Least-squares solution of a curve in its coordinates z, detected angles first, and its values by name at z."""
     defaults, is_detected = PriorDefaults(), np.isfinite(angles)
     detected, noise = angles[is_detected], np.deg2rad(defaults.angle_noise_degrees)
     lowest = np.min(detected)
     parameters = curve.parameters(detected, defaults)
 
+    def values_at(z: Vector) -> dict[str, jax.Array]:
+        return {p.name: jnp.asarray(p.prior.constrain(jnp.asarray(at))) for p, at in zip(parameters, z, strict=True)}
+
     def residuals(z: Vector) -> Vector:
-        values = {p.name: jnp.asarray(p.prior.constrain(jnp.asarray(at))) for p, at in zip(parameters, z, strict=True)}
-        angle = np.asarray(curve.wrap_angle(values, jnp.asarray(lengths)))
+        angle = np.asarray(curve.wrap_angle(values_at(z), jnp.asarray(lengths)))
         above = np.maximum(angle[~is_detected] - lowest, 0.0)
         return np.concatenate([(angle[is_detected] - detected) / noise, above / noise, z])
 
-    best = least_squares(residuals, np.zeros(len(parameters)))
+    return least_squares(residuals, np.zeros(len(parameters))), values_at
+
+
+def _errors(curve: Curve, lengths: Vector, angles: Vector) -> Vector:
+    """Error of each detected angle's prediction from the others [rad]."""
+    detected, noise = angles[np.isfinite(angles)], np.deg2rad(PriorDefaults().angle_noise_degrees)
+    best, _ = _fit(curve, lengths, angles)
     left, _ = np.linalg.qr(best.jac)
     leverage = np.sum(left**2, axis=1)[: len(detected)]
     return noise * best.fun[: len(detected)] / np.maximum(1 - leverage, 1e-6)

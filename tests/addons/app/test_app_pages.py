@@ -94,7 +94,7 @@ def test_two_tabs_show_the_same_and_every_page_can_be_read(chromium, tmp_path, q
         assert page.get_by_label("Row 1, column 1", exact=True).input_value() == "20"
         assert faults_of(page) == []
         other.goto(page.url)
-        other.get_by_text("'many' is not a number").wait_for()
+        other.get_by_text("'many' is not a number").first.wait_for()
         other.goto(f"{visit.root}/fit/on-body")
         other.locator("#arrives p").first.wait_for()
         assert faults_of(other) == []

@@ -1,0 +1,171 @@
+"""The rows of a data set as they stand in its files, and what was read of them: before a fit, and although some are refused."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from bowdenfit.addons.app.draft import Refusal
+from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
+from bowdenfit.description import Description, Table
+from bowdenfit.description.measurements import ExcludedRows
+from bowdenfit.errors import BowdenfitError, Faults
+from bowdenfit.files.columns import Column, Quantity
+from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.descriptions import load_description
+from bowdenfit.kinds.rows import ENDS, shared_columns
+from bowdenfit.kinds.table_files import Source
+
+READ, LEFT_OUT, REFUSED = "read", "left out", "refused"
+_WANTED = (*ENDS, Quantity("efficiency", "ratio", optional=True))
+
+
+@dataclass(frozen=True)
+class FileRow:
+    """A row of readings as it stands in its file.
+
+    Args:
+        row: Its number there.
+        cells: Its cells.
+        state: Whether it is read, left out by the user, or refused.
+        why: Why it is left out or refused; empty where it is read.
+    """
+
+    row: int
+    cells: tuple[str, ...]
+    state: str = READ
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class FileRows:
+    """The rows of readings of one file.
+
+    Args:
+        kind: Kind of its table.
+        file: Its name, as seen from the data set.
+        headings: Headings of its columns.
+        rows: The rows.
+    """
+
+    kind: str
+    file: str
+    headings: tuple[str, ...]
+    rows: tuple[FileRow, ...]
+
+
+@dataclass(frozen=True)
+class UnusedRow:
+    """What can be drawn of a row that is not used.
+
+    Args:
+        kind: Kind of its table.
+        file: Name of its file, without folders.
+        row: Its number there.
+        state: Whether it is left out by the user, or refused.
+        values: Numbers in it by quantity, in internal units.
+    """
+
+    kind: str
+    file: str
+    row: int
+    state: str
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
+class MeasuredRows:
+    """What there is to draw of a data set.
+
+    Args:
+        dataset: What is read, without the rows that are refused; None where the rest is refused too.
+        files: The rows of its tables.
+        unused: What can be drawn of the others.
+    """
+
+    dataset: Dataset | None = None
+    files: tuple[FileRows, ...] = ()
+    unused: tuple[UnusedRow, ...] = ()
+
+
+def collect_rows(folder: Path, refusals: Sequence[Refusal] = ()) -> MeasuredRows:
+    """Return the rows of a data set.
+
+    Args:
+        folder: The data set.
+        refusals: Why it is refused.
+    """
+    refusals = [refusal for refusal in refusals if refusal.row]
+    try:
+        description = load_description(folder / DESCRIPTION_FILE, faults=Faults())
+    except BowdenfitError:
+        return MeasuredRows()
+    sources = [
+        Source(kind, settings, description, folder)
+        for kind, settings in description.tables.stated.items()
+        if isinstance(settings, Table)
+    ]
+    files, unused = list[FileRows](), list[UnusedRow]()
+    for source in sources:
+        with suppress(BowdenfitError):
+            for path in source.files:
+                file = _list_file_rows(source, path, refusals)
+                files.append(file)
+                unused += _find_unused(source, path, file)
+    dataset = None
+    with suppress(BowdenfitError):
+        dataset = read_dataset(_without_refused(description, sources, refusals), folder, {})
+    return MeasuredRows(dataset, tuple(files), tuple(unused))
+
+
+def _list_file_rows(source: Source, path: Path, refusals: Sequence[Refusal]) -> FileRows:
+    """Return the rows of readings of a file, with what becomes of each."""
+    table = read_table(path, sheet=source.sheets[0])
+    own_entries = [part for part in source.settings.exclude if part.file in (None, source.name_of(path))]
+    excluded = {row: part.reason for part in own_entries for row in part.rows}
+    refused = {refusal.row: refusal.sentence for refusal in refusals if refusal.file == path.name}
+    rows = []
+    for cells in table.rows:
+        number = cells[0].row
+        state = LEFT_OUT if number in excluded else REFUSED if number in refused else READ
+        why = excluded.get(number) or refused.get(number, "")
+        rows.append(FileRow(number, tuple(cell.text for cell in cells), state, why))
+    return FileRows(source.kind, source.name_of(path), table.header, tuple(rows))
+
+
+def _find_unused(source: Source, path: Path, file: FileRows) -> list[UnusedRow]:
+    """Return what can be drawn of the rows of a file that are not used."""
+    unused = {row.row: row.state for row in file.rows if row.state != READ}
+    if not unused:
+        return []
+    whole = Source(source.kind, source.settings.model_copy(update={"exclude": ()}), source.description, source.folder)
+    wanted = {quantity.name: quantity for quantity in (*_WANTED, *shared_columns(source.description))}
+    _, columns = whole.read_table(path, tuple(wanted.values()), sheet=source.sheets[0])
+    return [UnusedRow(source.kind, path.name, row, state, _read_numbers(columns, row)) for row, state in unused.items()]
+
+
+def _read_numbers(columns: dict[str, Column], row: int) -> dict[str, float]:
+    """Return the numbers in a row, of those cells that hold one."""
+    numbers = {}
+    for name, column in columns.items():
+        for cell in column.cells:
+            if cell.row == row:
+                with suppress(BowdenfitError):
+                    numbers[name] = column.value(cell)
+    return numbers
+
+
+def _without_refused(description: Description, sources: Sequence[Source], refusals: Sequence[Refusal]) -> Description:
+    """Return a description that leaves out the rows that are refused, so that the others can be drawn."""
+    tables = description.tables
+    for source in sources:
+        names = {path.name: source.name_of(path) for path in source.files}
+        refused = [
+            ExcludedRows(rows=(refusal.row,), reason=REFUSED, file=names[refusal.file])
+            for refusal in refusals
+            if refusal.file in names
+        ]
+        if refused:
+            settings = source.settings.model_copy(update={"exclude": (*source.settings.exclude, *refused)})
+            tables = tables.model_copy(update={source.kind: settings})
+    return description.model_copy(update={"tables": tables})

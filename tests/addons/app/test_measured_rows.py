@@ -1,0 +1,132 @@
+"""Rows are drawn before any fit: those that are read, those that the user leaves out, and those that are refused."""
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from half_turn_bench import describe_half_turn
+
+import bowdenfit as bf
+from bowdenfit.addons.app.angle_charts import fit_curves
+from bowdenfit.addons.app.data_charts import make_pictures
+from bowdenfit.addons.app.description_edit import exclude_row, include_row, write_description
+from bowdenfit.addons.app.draft import list_refusals
+from bowdenfit.addons.app.measured_rows import LEFT_OUT, READ, REFUSED, collect_rows
+from bowdenfit.addons.app.points import row_key
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.kinds.forces.table import ForceTable
+
+DATASETS = Path(__file__).parents[3] / "datasets"
+ROWS = ["20,15.2,1", "40,30.1,1", "60,45.6,1", "20,15.0,2", "40,30.9,2", "60,46.0,2"]
+
+
+@pytest.fixture
+def bench(tmp_path):
+    """A bench with six readings, and comments in its description."""
+    (tmp_path / "cable.toml").write_text(f"# ours\n{describe_half_turn()}\n# the end\n")
+    write_rows(tmp_path, ROWS)
+    return tmp_path
+
+
+def write_rows(folder, rows):
+    """Write the table of a bench."""
+    (folder / "forces.csv").write_text("\n".join(["input_force_N,output_force_N,run", *rows, ""]))
+
+
+def points_of(pictures, label):
+    """Places and keys of the points with a label on the first chart."""
+    series = [(group, series) for group in pictures[0].charts[0].groups for series in group.series if series.label == label]
+    places = [zip(group.x, part.values, part.keys, strict=True) for group, part in series]
+    return sorted((float(x), float(y), key) for some in places for x, y, key in some)
+
+
+def test_every_reading_is_a_point_that_is_called_as_its_row(bench):
+    measured = collect_rows(bench)
+    table = bf.read(bench).measurements.table(ForceTable)
+    expected = zip(table.input_force, table.output_force, table.origin.row, strict=True)
+    keys = sorted((float(x), float(y), row_key("forces.csv", row)) for x, y, row in expected)
+    assert points_of(make_pictures(measured), "Pulling") == keys
+    assert [row.row for row in measured.files[0].rows] == [2, 3, 4, 5, 6, 7]
+
+
+def test_a_row_is_left_out_with_its_reason_and_taken_in_again(bench):
+    original = (bench / "cable.toml").read_text()
+    exclude_row(bench, "forces", "forces.csv", 3, "the  rope\njumped")
+    exclude_row(bench, "forces", "forces.csv", 6, "the rope jumped")
+    exclude_row(bench, "forces", "forces.csv", 4, "typed twice")
+    text = (bench / "cable.toml").read_text()
+    entries = tomllib.loads(text)["tables"]["forces"]["exclude"]
+    assert entries == [{"rows": [3, 6], "reason": "the rope jumped"}, {"rows": [4], "reason": "typed twice"}]
+    assert text.startswith("# ours\n") and text.endswith("# the end\n")
+    measured = collect_rows(bench)
+    assert [row.state for row in measured.files[0].rows] == [READ, LEFT_OUT, LEFT_OUT, READ, LEFT_OUT, READ]
+    gray = points_of(make_pictures(measured), "Left out by you")
+    assert gray == [(40.0, 30.1, "3 forces.csv"), (40.0, 30.9, "6 forces.csv"), (60.0, 45.6, "4 forces.csv")]
+    assert "3 readings left out by the user" in str(bf.check(bench))
+    for row in (3, 6, 4):
+        include_row(bench, "forces", "forces.csv", row)
+    assert (bench / "cable.toml").read_text() == original
+
+
+def test_refused_rows_are_red_and_the_others_are_drawn_all_the_same(bench):
+    write_rows(bench, [*ROWS[:2], "60,many,1", *ROWS[3:5], "60,-46.0,2"])
+    with pytest.raises(BowdenfitError) as refusal:
+        bf.check(bench)
+    measured = collect_rows(bench, list_refusals(refusal.value))
+    assert [row.state for row in measured.files[0].rows] == [READ, READ, REFUSED, READ, READ, REFUSED]
+    assert "'many' is not a number" in measured.files[0].rows[2].why
+    pictures = make_pictures(measured)
+    assert len(points_of(pictures, "Pulling")) == 4
+    assert points_of(pictures, "Refused") == [(60.0, -46.0, "7 forces.csv")]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda folder: exclude_row(folder, "forces", "forces.csv", 3, " "), "write why row 3 is left out"),
+        (lambda folder: exclude_row(folder, "angles", "forces.csv", 3, "x"), "has no table angles"),
+        (lambda folder: write_description(folder, "name = "), "this is no TOML"),
+        (lambda folder: write_description(folder, 'name = "x"\n'), "contact"),
+    ],
+)
+def test_what_cannot_be_described_leaves_the_description_as_it_was(bench, change, words):
+    original = (bench / "cable.toml").read_bytes()
+    with pytest.raises(BowdenfitError, match=words):
+        change(bench)
+    assert (bench / "cable.toml").read_bytes() == original
+
+
+def test_a_description_that_is_a_link_is_not_written_through(bench, tmp_path_factory):
+    other = tmp_path_factory.mktemp("other") / "cable.toml"
+    shutil.move(bench / "cable.toml", other)
+    (bench / "cable.toml").symlink_to(other)
+    with pytest.raises(BowdenfitError, match="link"):
+        exclude_row(bench, "forces", "forces.csv", 3, "x")
+    assert "exclude" not in other.read_text()
+
+
+def test_the_curves_that_would_be_fitted_follow_the_angles():
+    dataset = bf.read(DATASETS / "on-body-exoskeleton")
+    (group,) = fit_curves(dataset)
+    assert [series.label for series in group.series] == [
+        "free sheath angle, gaussian curve, least squares", "squeezed sheath angle, gaussian curve, least squares",
+    ]  # fmt: skip
+    angles = {(470, 0): 19.0, (520, 0): 91.0, (440, 1): 45.0}  # of the paper's table, deg
+    for (length, column), angle in angles.items():
+        assert np.interp(length, group.x, group.series[column].values) == pytest.approx(angle, abs=3)
+
+
+@pytest.mark.parametrize("name", ["synthetic-recordings", "synthetic-haptic-loop", "synthetic-bench", "yarn-on-cylinder"])
+def test_every_kind_of_table_has_charts(name):
+    pictures = make_pictures(collect_rows(DATASETS / name))
+    assert pictures and all(picture.charts for picture in pictures)
+    for chart in (chart for picture in pictures for chart in picture.charts):
+        assert "(" in chart.x_label and "(" in chart.y_label  # with units
+        assert all(np.all(np.diff(group.x) > 0) for group in chart.groups if len(group.x) and group.series[0].look == "points")
+
+
+def test_a_reason_is_needed(bench):
+    with pytest.raises(UsageError, match="200 characters"):
+        exclude_row(bench, "forces", "forces.csv", 3, "x" * 201)

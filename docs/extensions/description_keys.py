@@ -4,8 +4,9 @@
     variable: what it says, in words
     ```
 
-Permitted values and defaults come from the class; with the option `:values:`, only defaults are shown. The descriptions are on
-the page, or, for a dataclass or for keywords, in its docstring. A key without a description, or a description without a
+Permitted values and defaults come from the class; with the option `:values:`, only defaults are shown. The descriptions are
+in `bowdenfit/questions/schema/keys.toml`, which the JSON schema says too, or on the page; or, for a dataclass or for keywords,
+in its docstring. A key without a description, or a description without a
 key, causes a warning, so that the page cannot fall behind the program.
 """
 
@@ -26,6 +27,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.logging import getLogger
 
 from bowdenfit.arguments import NumberWithUnit
+from bowdenfit.questions.schema.schemas import load_key_descriptions
 
 _LOG = getLogger(__name__)
 _PLAIN = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`"}
@@ -50,7 +52,7 @@ class Keys(SphinxDirective):
         """Return the list as nodes."""
         module, _, name = self.arguments[0].partition(":")
         model = getattr(import_module(module), name)
-        words, known = _words(self.content), keys_of(model)
+        words, known = {**load_key_descriptions().get(name, {}), **_words(self.content)}, keys_of(model)
         if not issubclass(model, BaseModel):
             words = keywords_in(model)
         for key in words.keys() ^ known.keys():

@@ -49,8 +49,9 @@ class DataSetPage:
                         text_input("fit-name", self._fit_name, self._state_name)
                     self._seed_place = block("div")
                     self._show_seed()
-            with section("Add what was measured", "add"), block("div", "row"):
+            with section("Change it", "add"), block("div", "row"):
                 show_table_links(workbench, name)
+                link("Describe the cable", address("describe", name), "button")
                 link("Live: fit again after each mounting", address("live", name), "button")
             with section("What was measured", "understood"):
                 self._place = block("div", aria_live="polite")

@@ -1,5 +1,6 @@
 """The addresses of the app: its pages, and the files that they show or take."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from fastapi import FastAPI, Request, Response
@@ -10,6 +11,7 @@ from bowdenfit.addons.app.add_rows import AddRowsPage
 from bowdenfit.addons.app.ask import export_file
 from bowdenfit.addons.app.bring import show_draft, show_start
 from bowdenfit.addons.app.data_set import DataSetPage
+from bowdenfit.addons.app.describe import DescribePage
 from bowdenfit.addons.app.frame import frame, refused, style_and_script
 from bowdenfit.addons.app.live import LivePage
 from bowdenfit.addons.app.see import FitPage
@@ -55,12 +57,13 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
         else:
             DataSetPage(workbench, name)
 
+    @ui.page("/describe/{name}")
+    def describe(name: str) -> None:
+        _show_unless_refused(f"Describe {name}", lambda: DescribePage(workbench, name))
+
     @ui.page("/table/{name}")
     def table(name: str, file: str = "") -> None:
-        try:
-            AddRowsPage(workbench, name, file)
-        except BowdenfitError as error:
-            _show_refusal(f"Add rows to {file}", str(error))
+        _show_unless_refused(f"Add rows to {file}", lambda: AddRowsPage(workbench, name, file))
 
     @ui.page("/fit/{name}")
     def fit(name: str) -> None:
@@ -83,6 +86,14 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
     @ui.page("/compare")
     def compare(one: str = "", other: str = "") -> None:
         TwoFitsPage(workbench, (one, other))
+
+
+def _show_unless_refused(title: str, show: Callable[[], object]) -> None:
+    """Show a page, or why it cannot be shown."""
+    try:
+        show()
+    except BowdenfitError as error:
+        _show_refusal(title, str(error))
 
 
 def _show_refusal(title: str, sentence: str) -> None:

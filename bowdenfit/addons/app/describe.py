@@ -1,0 +1,197 @@
+"""The page on which a cable is described: a form for every key of its cable.toml, with the text next to it."""
+
+import tomllib
+from collections.abc import Callable
+from functools import partial
+from html import escape
+from typing import Any
+
+from nicegui import ui
+
+from bowdenfit.addons.app.description_edit import read_description_text, write_description
+from bowdenfit.addons.app.description_form import (
+    MENU,
+    YES_NO,
+    FormField,
+    FormGroup,
+    add_part,
+    list_groups,
+    set_field,
+    table_kinds,
+)
+from bowdenfit.addons.app.elements import address, block, button, choice, field, markup, text, text_input
+from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.workbench import Workbench
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.kinds.descriptions import parse_description
+
+_VALUE = "event => emit(event.target.value)"
+_PAUSE = 0.6  # s between two checks of a text that is typed; a judgement
+_PARTS = (("contact", "Contact"), ("friction", "Friction coefficient"), ("prior", "Prior of another parameter"))
+
+
+class DescribePage:
+    """The page of one cable.toml.
+
+    Args:
+        workbench: Where the data set lies.
+        name: Name of the data set.
+
+    Raises:
+        UsageError: There is no such data set, or its description is no text.
+    """
+
+    def __init__(self, workbench: Workbench, name: str) -> None:
+        self._workbench, self._name = workbench, name
+        self._text = self._saved = read_description_text(workbench.data_set(name))
+        self._open: set[str] = set()
+        title = workbench.title_of(name)
+        with frame("Describe the cable", ((title, address("data", name)),)):
+            text("Every key that cable.toml may have. What is left empty is left out, and then holds what is said below it.")
+            self._status = block("div", role="status", id="description-status")
+            with block("div", "describing"):
+                self._form = block("div", id="description-form")
+                with block("div", "beside"), section("cable.toml", "description-text"):
+                    self._editor = block("div")
+            self._draw()
+
+    def _draw(self) -> None:
+        """Show form and text."""
+        self._draw_form()
+        self._editor.clear()
+        with self._editor:
+            area = markup(escape(self._text), "textarea", "toml", id="toml", data_key="toml", rows="32", aria_label="Text")
+            area.props["spellcheck"] = "false"
+            area.on("input", self._check_typed, throttle=_PAUSE, leading_events=False, js_handler=_VALUE)
+            area.on("change", self._take_text, js_handler=_VALUE)
+            with block("div", "row"):
+                button("Save cable.toml", lambda: attempt(self._save), "primary")
+                button("Undo all changes", self._undo)
+        self._show_status()
+
+    def _draw_form(self) -> None:
+        """Show the groups of the form; of a text that is no TOML nothing, so that nothing of it is lost."""
+        self._form.clear()
+        with self._form:
+            try:
+                groups = list_groups(tomllib.loads(self._text))
+            except (tomllib.TOMLDecodeError, RecursionError):
+                text("The form comes back when the text is TOML again.", classes="hint")
+                return
+            for number, group in enumerate(groups):
+                self._show_group(group, number == 0)
+            self._show_additions()
+
+    def _show_group(self, group: FormGroup, is_first: bool) -> None:
+        """Show one group, open where it was opened."""
+        with block("details") as part:
+            text(group.title if group.is_stated else f"{group.title} (nothing stated)", "summary", dir="auto")
+            for entry in group.fields:
+                self._show_field(entry)
+        if is_first or group.title in self._open:
+            part.props["open"] = True
+        part.on("toggle", partial(self._note_open, group.title), js_handler="event => emit(event.target.open)")
+
+    def _note_open(self, title: str, event: Any) -> None:
+        (self._open.add if event.args else self._open.discard)(title)
+
+    def _show_field(self, entry: FormField) -> None:
+        """Show one key."""
+        label = f"{entry.label} (needed)" if entry.needed else entry.label
+        with field(label, entry.key, entry.hint):
+            options = entry.options if entry.kind == MENU else ("true", "false") if entry.kind == YES_NO else ()
+            if options:
+                unknown = () if entry.value in ("", *options) else (entry.value,)
+                choices = [("", "left out"), *((option, option) for option in (*options, *unknown))]
+                choice(entry.key, entry.value, choices, self._setter(entry))
+            else:
+                text_input(entry.key, entry.value, self._setter(entry))
+
+    def _setter(self, entry: FormField) -> Callable[[str], Any]:
+        async def change(typed: str) -> None:
+            def apply() -> None:
+                self._text = set_field(self._text, entry, typed)
+
+            await attempt(apply)
+            self._draw()
+
+        return change
+
+    def _show_additions(self) -> None:
+        """Show how a contact, a coefficient, a prior or a table is added."""
+        with block("details"):
+            text("Add a contact, a coefficient, a prior or a table", "summary")
+            for topic, words in _PARTS:
+                self._show_addition(topic, words)
+            kind = {"name": ""}
+            with block("div", "row"):
+                with field("Table of", "add-tables"):
+                    options = [("", "choose one"), *((name, name) for name in table_kinds())]
+                    choice("add-tables", "", options, lambda name: kind.update(name=name))
+                button("Add the table", lambda: self._add("tables", kind["name"]), key="add-table")
+
+    def _show_addition(self, topic: str, words: str) -> None:
+        """Show the field and the button that add one."""
+        name = {"name": ""}
+        with block("div", "row"):
+            with field(f"{words}: its name", f"add-{topic}"):
+                text_input(f"add-{topic}", "", lambda typed: name.update(name=typed))
+            button(f"Add the {words.split()[0].lower()}", lambda: self._add(topic, name["name"]), key=f"add-{topic}-button")
+
+    async def _add(self, topic: str, name: str) -> None:
+        def apply() -> None:
+            self._text = add_part(self._text, topic, name)
+
+        if await attempt(apply):
+            self._draw()
+
+    def _check_typed(self, event: Any) -> None:
+        """Say what is wrong with a text while it is typed."""
+        self._text = str(event.args)
+        self._show_status()
+
+    def _take_text(self, event: Any) -> None:
+        """Take a text that was typed, into the form too."""
+        self._text = str(event.args)
+        self._draw_form()
+        self._show_status()
+
+    def _show_status(self) -> None:
+        """Show whether the description can be read."""
+        self._status.clear()
+        with self._status:
+            if fault := find_fault(self._text):
+                refused(fault)
+            else:
+                state = "It is as it was saved." if self._text == self._saved else "It can be saved."
+                text(f"Nothing is wrong with this description by itself. {state}", classes="state good")
+
+    def _undo(self) -> None:
+        self._text = self._saved
+        self._draw()
+
+    def _save(self) -> None:
+        """Save it, unless it was changed elsewhere meanwhile.
+
+        Raises:
+            UsageError, DescriptionError, StoreError: It cannot be saved.
+        """
+        folder = self._workbench.data_set(self._name)
+        if read_description_text(folder) != self._saved:
+            raise UsageError(
+                "cable.toml has changed since this page was opened, and nothing was saved; copy your text, load this page "
+                "again, and put your changes in."
+            )
+        write_description(folder, self._text)
+        ui.navigate.to(address("data", self._name))
+
+
+def find_fault(description: str) -> str:
+    """Return why the text of a description is refused by itself; empty where it is not."""
+    try:
+        parse_description(tomllib.loads(description))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return f"This is no TOML: {error}. The usual cause is a missing quotation mark or bracket there."
+    except BowdenfitError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,58 @@
+"""A cable is described in a form and in the text next to it, which say the same, and are saved once nothing is wrong."""
+
+import tomllib
+
+import pytest
+from app_in_browser import served, visiting
+from half_turn_bench import TABLE, describe_half_turn
+from offline_browser import FAULTS, browser
+
+ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one footer")  # what an app has, and a report has not
+pytestmark = pytest.mark.extended
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A browser; tests are skipped where there is none."""
+    with browser() as program:
+        yield program
+
+
+def faults_of(page):
+    """What is wrong with a page: contrast, names of controls, headings, width."""
+    return [fault for fault in page.evaluate(FAULTS) if not fault.startswith(ALLOWED)]
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])
+def test_form_and_text_say_the_same_and_are_saved(chromium, tmp_path, width, scheme):
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    (folder / "cable.toml").write_text(f"# </textarea><b>ours</b>\n{describe_half_turn()}")
+    (folder / "forces.csv").write_text(TABLE)
+    with served(tmp_path) as app, visiting(chromium, app, width=width, color_scheme=scheme) as visit:
+        page = visit.page
+        page.goto(f"{visit.root}/data/bench")
+        page.get_by_role("link", name="Describe the cable").click()
+        page.get_by_text("It is as it was saved.").wait_for()
+        assert page.input_value("#toml").startswith("# </textarea><b>ours</b>\n")
+        page.get_by_text("Load cells").click()
+        page.get_by_label("force_noise", exact=True).fill("half")
+        page.keyboard.press("Tab")
+        page.get_by_text("'half' is not a number with its unit").wait_for()
+        page.get_by_label("force_noise", exact=True).fill("0.5 N")
+        page.keyboard.press("Tab")
+        page.get_by_text("It can be saved.").wait_for()
+        assert tomllib.loads(page.input_value("#toml"))["sensors"]["force_noise"] == {"value": 0.5, "unit": "N"}
+        assert faults_of(page) == []
+        text = page.input_value("#toml")
+        page.fill("#toml", text.replace('name = "bench"', 'name = "bench" x'))
+        page.get_by_text("This is no TOML").wait_for()
+        page.get_by_role("button", name="Save cable.toml").click()
+        page.get_by_text("cable.toml is as it was.").wait_for()
+        page.fill("#toml", text.replace('name = "bench"', 'name = "bench 2"'))
+        page.get_by_text("It can be saved.").wait_for()
+        page.keyboard.press("Tab")
+        page.get_by_role("button", name="Save cable.toml").click()
+        page.get_by_text("Everything could be read").first.wait_for()
+    saved = tomllib.loads((folder / "cable.toml").read_text())
+    assert (saved["name"], saved["sensors"]["force_noise"]["value"]) == ("bench 2", 0.5)

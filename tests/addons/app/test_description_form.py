@@ -1,0 +1,94 @@
+"""The form has a field for every key of cable.toml, and what is typed into it is what a hand would write."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from bowdenfit.addons.app.describe import find_fault
+from bowdenfit.addons.app.description_form import MENU, add_part, list_groups, set_field, show_value
+from bowdenfit.errors import UsageError
+from bowdenfit.kinds.descriptions import CableDescription, parse_description
+
+DATASETS = Path(__file__).parents[3] / "datasets"
+BENCH = (DATASETS / "on-body-exoskeleton" / "cable.toml").read_text()
+
+
+def fields_of(text):
+    """Every field of the form of a description, by its keys."""
+    return {field.path: field for group in list_groups(tomllib.loads(text)) for field in group.fields}
+
+
+def test_every_top_level_key_has_a_field_that_says_what_it_does():
+    fields = fields_of(add_part(add_part(BENCH, "friction", "mu3"), "prior", "tau"))
+    keys = set(CableDescription.model_fields) - {"schema_", "recording"}
+    assert {path[0] for path in fields} == keys
+    silent = [path for path, field in fields.items() if not field.hint]
+    assert silent == []
+
+
+@pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-recordings", "yarn-on-cylinder", "synthetic-haptic-loop"])
+def test_typing_what_stands_there_changes_nothing(name):
+    text = (DATASETS / name / "cable.toml").read_text()
+    for field in fields_of(text).values():
+        if field.value:
+            assert tomllib.loads(set_field(text, field, field.value)) == tomllib.loads(text), field.path
+
+
+@pytest.mark.parametrize(
+    ("path", "typed", "expected"),
+    [
+        (("sensors", "input_ratio"), "2", 2),
+        (("sensors", "force_noise"), "0.5 N", {"value": 0.5, "unit": "N"}),
+        (("contact", 0, "wrap_angle", "curve"), "smooth", "smooth"),
+        (("route", "range"), "[420, 540]", [420, 540]),
+        (("noise",), "student", "student"),
+        (("sampler", "max_steps"), "40000", 40000),
+        (("reference_force",), "50 N", {"value": 50, "unit": "N"}),
+    ],
+)
+def test_a_field_is_written_where_a_hand_would_write_it(path, typed, expected):
+    text = set_field(BENCH, fields_of(BENCH)[path], typed)
+    node = tomllib.loads(text)
+    for part in path:
+        node = node[part]
+    assert node == expected
+    parse_description(tomllib.loads(text))
+    assert "# past 530 mm the cable flips" in text or path == ("route", "range")
+    cleared = set_field(text, fields_of(text)[path], "")
+    original = fields_of(BENCH)[path].value
+    assert fields_of(cleared)[path].value == ("" if not original or path[0] in ("contact", "route") else original)
+
+
+def test_curves_are_a_menu():
+    field = fields_of(BENCH)["contact", 0, "wrap_angle", "curve"]
+    assert (field.kind, field.options) == (MENU, ("gaussian", "line", "logistic", "smooth"))
+
+
+@pytest.mark.parametrize(
+    ("path", "typed", "words"),
+    [
+        (("sensors", "input_gain_error_sd"), "much", "is not a number"),
+        (("sensors", "force_noise"), "0.5", "not a number with its unit"),
+        (("sampler", "max_steps"), "1.5", "is not a whole number"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(path, typed, words):
+    with pytest.raises(UsageError, match=words):
+        set_field(BENCH, fields_of(BENCH)[path], typed)
+
+
+def test_parts_are_added_and_refused_by_the_name_of_others():
+    text = add_part(BENCH, "contact", "ferrule")
+    assert tomllib.loads(text)["contact"][-1]["name"] == "ferrule"
+    assert find_fault(text) == ""
+    with pytest.raises(UsageError, match="not in use yet"):
+        add_part(text, "contact", "ferrule")
+    assert "TOML" in find_fault("name = ")
+    assert "unknown key 'sampler.walkers'" in find_fault(f"{BENCH}\n[sampler]\nwalkers = 3\n")
+
+
+def test_values_are_shown_as_they_are_typed():
+    assert show_value({"value": 45, "unit": "deg"}) == "45 deg"
+    assert show_value({"value": 45, "unit": "deg", "sd": 2}) == '{ value = 45, unit = "deg", sd = 2 }'
+    assert show_value(["a", 'b"', True]) == '["a", "b\\"", true]'

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from nicegui import ui
+from nicegui.element import Element
 
 from bowdenfit.addons.app.data_charts import sketch_file
 from bowdenfit.addons.app.draft import Draft, Refusal, Understanding
@@ -22,6 +23,7 @@ from bowdenfit.addons.app.elements import (
     text_input,
 )
 from bowdenfit.addons.app.frame import NAME, attempt, frame, notify, refused, section
+from bowdenfit.addons.app.history import read_past_fit, show_past_fit
 from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.sheet import FILE as TYPED
@@ -117,11 +119,20 @@ def _show_fits(workbench: Workbench) -> None:
     with section("Fits", "fits"):
         if sum(fit.finished for fit in fits) > 1:
             link("Compare two fits", "/compare")
-        _show_fit_cards(fits, running)
+        _show_fit_cards(workbench, fits, running)
 
 
-def _show_fit_cards(fits: list[KeptFit], running: list[str]) -> None:
+def _show_fit_cards(workbench: Workbench, fits: list[KeptFit], running: list[str]) -> None:
     """Show a card for each fit."""
+    places: dict[str, Element] = {}
+
+    async def fill() -> None:
+        for name, place in places.items():
+            past = await workbench.compute(read_past_fit, workbench, name)
+            with place:
+                show_past_fit(past)
+
+    ui.timer(0.05, fill, once=True)
     with block("ul", "cards"):
         for name in dict.fromkeys([*running, *(fit.name for fit in fits)]):
             finished = any(fit.name == name and fit.finished for fit in fits)
@@ -131,6 +142,8 @@ def _show_fit_cards(fits: list[KeptFit], running: list[str]) -> None:
                     text("Being fitted now.", classes="state doubtful")
                 elif not finished:
                     text("Interrupted; it can be resumed.", classes="state doubtful")
+                else:
+                    places[name] = block("div")
                 with block("div", "row"):
                     link("See the answer" if finished and name not in running else "Open", address("fit", name), "button")
 

@@ -7,6 +7,7 @@ from bowdenfit.addons.app.description_edit import exclude_row, include_row
 from bowdenfit.addons.app.draft import list_refusals
 from bowdenfit.addons.app.elements import address, block, button, field, link, text, text_input
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.history import show_history
 from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
@@ -42,7 +43,10 @@ class DataSetPage:
         with frame(workbench.title_of(name)):
             with section("Fit it", "fit"):
                 with block("div", "row"):
-                    button("Fit", lambda: attempt(self._start), "primary")
+                    if running := workbench.running_fit(name):
+                        link(f"{running} is being fitted: see how far it is", address("fit", running), "button")
+                    else:
+                        button("Fit", lambda: attempt(self._start), "primary")
                 with block("details"):
                     text("Name and seed", "summary")
                     with field("Kept as fits/", "fit-name"):
@@ -53,10 +57,18 @@ class DataSetPage:
                 show_table_links(workbench, name)
                 link("Describe the cable", address("describe", name), "button")
                 link("Live: fit again after each mounting", address("live", name), "button")
+            with section("Fits of it", "history"):
+                history = block("div")
             with section("What was measured", "understood"):
                 self._place = block("div", aria_live="polite")
         with self._place:
             text("Reading ...")
+
+        async def look_back() -> None:
+            with history:
+                await show_history(workbench, name)
+
+        ui.timer(0.05, look_back, once=True)
         ui.timer(0.05, self._look, once=True)
 
     def _state_name(self, typed: str) -> None:
@@ -86,6 +98,8 @@ class DataSetPage:
         Raises:
             UsageError: The seed or the name cannot be taken, or the fit runs already.
         """
+        if running := self._workbench.running_fit(self._name):
+            raise UsageError(f"the fit {running} of this data set runs already; wait for it, or cancel it.")
         self._workbench.start_fit(self._fit_name, self._name, read_seed(self._seed))
         ui.navigate.to(address("fit", self._fit_name))
 

@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from bowdenfit.addons.app.ask import ARRIVES, STOP, show_arriving, show_files, show_next
-from bowdenfit.addons.app.elements import address, block, button, choice, field, link, markup, session_root, text
+from bowdenfit.addons.app.elements import (
+    address,
+    block,
+    button,
+    choice,
+    field,
+    link,
+    markup,
+    session_root,
+    text,
+    text_input,
+)
 from bowdenfit.addons.app.fit_job import FitJob
-from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.frame import attempt, frame, notify, refused, section
+from bowdenfit.addons.app.history import read_past_fit
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.display import Preformatted
 from bowdenfit.errors import BowdenfitError
@@ -145,6 +157,10 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
     try:
         printed = await workbench.compute(_read_summary, folder)
         contents = block("div", id="contents")
+        past = await workbench.compute(read_past_fit, workbench, name)
+        if past.change:
+            with block("div", "verdict doubtful", role="status"):
+                text(past.change)
         with block("div", "columns-of-page"):
             with block("div") as left, section("The answer", "answer"):
                 answer = _show_text(printed)
@@ -168,6 +184,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         show_arriving(workbench, fit)
         show_next(workbench, fit, name)
         show_files(name)
+        _show_keeping(workbench, name)
     with right, section(report_room.FIGURES_TITLE, "figures"):
         markup(pictures, "div")
     parts = [(heading, f"part-{heading.lower().replace(' ', '-')}", html) for heading, html in others]
@@ -177,6 +194,30 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         for heading, key, html in parts:
             with section(heading, key):
                 markup(html, "div")
+
+
+def _show_keeping(workbench: Workbench, name: str) -> None:
+    """Show how a fit is renamed, or put into the bin."""
+    new = {"name": name}
+
+    def rename() -> None:
+        workbench.rename_fit(name, new["name"])
+        ui.navigate.to(address("fit", new["name"]))
+
+    def discard() -> None:
+        place = workbench.discard_fit(name)
+        notify(f"{name} lies in {place.parent} now; move it back from there if you want it again.")
+        ui.timer(2.0, lambda: ui.navigate.to("/"), once=True)
+
+    with block("details"):
+        text("Rename or delete this fit", "summary")
+        with block("div", "row"):
+            with field("Name", "new-name"):
+                text_input("new-name", name, lambda typed: new.update(name=typed))
+            button("Rename it", lambda: attempt(rename))
+        with block("div", "row"):
+            button("Delete it", lambda: attempt(discard))
+            text("It is moved into fits/.deleted.", classes="hint")
 
 
 def _show_contents(parts: list[tuple[str, str]]) -> None:

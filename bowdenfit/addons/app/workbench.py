@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from secrets import token_hex
 from tempfile import TemporaryDirectory
@@ -17,8 +18,9 @@ import bowdenfit as bf
 from bowdenfit.addons.app.draft import Draft, is_module_name, is_reserved
 from bowdenfit.addons.app.fit_job import FitJob, FitRequest
 from bowdenfit.dataset import DESCRIPTION_FILE
-from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.errors import BowdenfitError, UsageError, disk_error
 from bowdenfit.inputs import refuse_special
+from bowdenfit.outputs import refuse_link
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figure_data, warning_mark, write_figure_files
 from bowdenfit.results.folder import CHAIN, kept_file
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
 Answer = TypeVar("Answer")
 FITS = "fits"  # the folder in which the command line keeps them, too
+BIN = ".deleted"  # in it, where fits go that are deleted
 _HERE = "."  # the data set that the folder itself is
 _NAME = re.compile(r"[^\W_][\w .()+-]{0,79}")  # of folders that are made: no separator, no leading dot, one line
 _MOST_OPEN = 4  # fits that are kept in memory; a judgement
@@ -115,7 +118,7 @@ class Workbench:
             name: Name of the fit, which decides between data sets with the same description.
         """
         checksum = fit.dataset.sha256.get(DESCRIPTION_FILE)
-        names = [one for one in self.data_sets() if _checksum(self.data_set(one) / DESCRIPTION_FILE) == checksum]
+        names = [one for one in self.data_sets() if file_checksum(self.data_set(one) / DESCRIPTION_FILE) == checksum]
         return max(names, key=lambda one: (name.startswith(self.title_of(one)), len(one)), default="")
 
     def fits(self) -> list[KeptFit]:
@@ -135,6 +138,48 @@ class Workbench:
         if (job is None or job.is_void) and name not in {fit.name for fit in self.fits()}:
             raise UsageError(f"there is no fit {shown(name)} in {self.folder.name} any more; go back to the start.")
         return self.folder / FITS / name
+
+    def running_fit(self, name: str) -> str:
+        """Name of a fit of a data set that runs; empty where none does."""
+        folder = self.data_set(name)
+        return next((fit for fit, job in self.jobs.items() if job.running and job.request.dataset == folder), "")
+
+    def rename_fit(self, name: str, new_name: str) -> None:
+        """Give a fit that does not run another name.
+
+        Raises:
+            UsageError: There is none of that name, it runs, or the new name cannot be one or is in use.
+            StoreError: It cannot be renamed.
+        """
+        refuse_folder_name(new_name)
+        if (self.folder / FITS / new_name).exists():
+            raise UsageError(f"there is {shown(new_name)} already; write another name.")
+        self._move_fit(name, self.folder / FITS / new_name)
+
+    def discard_fit(self, name: str) -> Path:
+        """Put a fit that does not run into the bin, and return where it lies there.
+
+        Raises:
+            UsageError, StoreError: See `rename_fit`.
+        """
+        names = [name, *(f"{name}-{number}" for number in range(2, 1000))]
+        place = next(place for place in (self.folder / FITS / BIN / free for free in names) if not place.exists())
+        self._move_fit(name, place)
+        return place
+
+    def _move_fit(self, name: str, place: Path) -> None:
+        folder, job = self.results(name), self.jobs.get(name)
+        if job is not None and job.running:
+            raise UsageError(f"the fit {name} runs; wait for it, or cancel it first.")
+        try:
+            refuse_link(folder)
+            place.parent.mkdir(exist_ok=True)
+            refuse_link(place.parent)
+            folder.rename(place)
+        except OSError as error:
+            raise disk_error(folder, error) from None
+        self.jobs.pop(name, None)
+        self._open.pop(name, None)
 
     def free_name(self, name: str) -> str:
         """Return the name of a data set, or with a number behind it, that no fit has yet."""
@@ -219,13 +264,25 @@ class Workbench:
         self._thread.shutdown(wait=False, cancel_futures=True)
 
 
-def _checksum(path: Path) -> str:
-    """Return the checksum of a file, as a fit keeps it; empty of none that can be read."""
+def file_checksum(path: Path) -> str:
+    """Checksum of a file, as a fit keeps it; empty of none that can be read.
+
+    Args:
+        path: The file.
+    """
     try:
         refuse_special(path)
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        status = path.stat()
+        return _digest(path, status.st_mtime_ns, status.st_size)
     except (OSError, BowdenfitError):
         return ""
+
+
+@lru_cache(1000)
+def _digest(path: Path, _: int, __: int) -> str:
+    """Checksum of a file that is as it was at a time, with a size."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _collect_figure_data(fit: Fit) -> dict[str, Any]:

@@ -1,13 +1,23 @@
 """Data frames: a table in memory is read as the CSV file that its own library writes of it."""
 
+import re
+import shlex
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.words import shown
 
 FILE = "dataframe.csv"  # what refusals call it
+Refusal = TypeVar("Refusal", bound=BowdenfitError)
+_TOML = r"(?: \(in cable\.toml (?:[^()]|\([^()]*\))*\))?"
+_NAMED = re.compile(rf"(?<![\w'\"-])--column (\w[\w.]*=(?:'[^']*'|[^\s,;]*[^\s,;.])){_TOML}")
+_CODE = re.compile(rf"(?<![\w'\"-])--missing ([^\s,;]*[^\s,;.]){_TOML}")
+_ANGLE = re.compile(r"(?<![\w'\"-])--wrap-angle (\d[^\s,;]*[^\s,;.])")
+_OF_FILES = ", or write a cable.toml next to it with `bowdenfit init`; `bowdenfit check` prints the whole command"
+_KEYWORDS = {"--column": "columns", "--missing": "missing", "--wrap-angle": "wrap_angle", "--reading-limit": "reading_limit"}
 
 
 class Frame(Protocol):
@@ -53,3 +63,38 @@ def write_frame(frame: Any, folder: Path, name: str = FILE) -> Path:
     has_index = any(name is not None for name in frame.index.names)
     frame.to_csv(path, index=has_index, header=headings)
     return path
+
+
+def reword_refusal(error: Refusal) -> Refusal:
+    """The same refusal of a data frame in the words of a notebook: keywords of Python in place of options.
+
+    Args:
+        error: As a file would be refused.
+    """
+    reworded = type(error)(say_keywords(str(error)))
+    reworded.faults = tuple(reword_refusal(fault) for fault in error.faults)
+    reworded.fault_key, reworded.row, reworded.key_path = error.fault_key, error.row, error.key_path
+    return reworded
+
+
+def say_keywords(sentence: str) -> str:
+    """A sentence with keywords of Python in place of options of the command line.
+
+    Args:
+        sentence: As the command line prints it.
+    """
+    sentence = sentence.replace(_OF_FILES, "")
+    sentence = sentence.replace(f"{FILE} is a file without a description", "the data frame has no description")
+    sentence = _NAMED.sub(lambda match: f"columns=[{_unquoted(match[1])!r}]", sentence)
+    sentence = _CODE.sub(lambda match: f"missing=[{match[1]}]", sentence)
+    sentence = _ANGLE.sub(lambda match: f'wrap_angle="{match[1]}"', sentence)
+    for option, keyword in _KEYWORDS.items():
+        sentence = re.sub(rf"(?<![\w'\"-]){option}\b", keyword, sentence)
+    return sentence
+
+
+def _unquoted(argument: str) -> str:
+    """An argument as a shell would pass it on."""
+    with suppress(ValueError):
+        return "".join(shlex.split(argument))
+    return argument

@@ -19,8 +19,8 @@ from bowdenfit.arguments import (
     read_first,
     whole_number,
 )
-from bowdenfit.errors import UsageError
-from bowdenfit.frames import is_frame, write_frame
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.frames import is_frame, reword_refusal, write_frame
 from bowdenfit.stages import announce_stage
 from bowdenfit.words import listed
 
@@ -105,7 +105,10 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
         return dataset
     if is_frame(dataset):
         with TemporaryDirectory() as folder:
-            return read(write_frame(dataset, Path(folder)), **reading)
+            try:
+                return read(write_frame(dataset, Path(folder)), **reading)
+            except BowdenfitError as error:
+                raise reword_refusal(error) from None
     if not isinstance(dataset, str | PathLike):
         raise UsageError(
             f"a {type(dataset).__name__} is not a data set; name a folder or a file, or put the readings into a pandas "

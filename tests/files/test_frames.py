@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.errors import BowdenfitError
 from bowdenfit.kinds.forces.table import ForceTable
 
 ANGLE = "90deg"
@@ -71,3 +72,17 @@ def test_units_that_are_no_dictionary_are_a_sentence(frame):
     frame.attrs["units"] = "N"
     with pytest.raises(bf.UsageError, match="must be a dictionary by column"):
         bf.read(frame, wrap_angle=ANGLE)
+
+
+@pytest.mark.parametrize(
+    ("columns", "keywords", "words"),
+    [
+        ({"input_force_N": [20, 40], "output_force_N": [15, 30]}, {}, 'no description; .* such as wrap_angle="180deg"'),
+        ({"a": [20, 40], "b": [15, 30]}, {"wrap_angle": "180deg"}, r"columns=\['input_force=a:N'\]"),
+        ({"input_force_N": [20, -9999], "output_force_N": [15, 30]}, {"wrap_angle": "180deg"}, r"missing=\[-9999\]\."),
+    ],
+)
+def test_a_refused_frame_names_keywords_of_python_and_no_options(columns, keywords, words):
+    with pytest.raises(BowdenfitError, match=words) as refusal:
+        bf.read(pd.DataFrame(columns), **keywords)
+    assert "--" not in str(refusal.value) and "cable.toml" not in str(refusal.value)

@@ -31,6 +31,7 @@ from bowdenfit.questions.identify.judgment import assess_identifiability
 from bowdenfit.questions.predict.predictions import prediction_blocks
 from bowdenfit.questions.summary.brief import summary_blocks
 from bowdenfit.questions.summary.details import posterior_intervals
+from bowdenfit.questions.summary.latex import latex_table
 from bowdenfit.questions.summary.page import Summary, summarize
 from bowdenfit.questions.summary.verdict import Verdict, assess_fit
 from bowdenfit.results.along_route import Efficiencies
@@ -132,6 +133,10 @@ class Fit(Record):
     def summary(self) -> Summary:
         """Return everything on one page, for programs (the contents of summary.json)."""
         return Summary(summarize(self), partial(blocks_of, self))
+
+    def to_latex(self) -> str:
+        """Return the coefficients as a table of LaTeX, for a paper that uses the package booktabs."""
+        return latex_table(self)
 
     def verdict(self) -> Verdict:
         """Return whether the answers may be trusted, and if not, why."""

@@ -2,20 +2,24 @@
 
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
 from bowdenfit.addons.app.elements import address, block, button, field, markup, text, text_input
-from bowdenfit.addons.app.frame import attempt, frame, section
+from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.workbench import Workbench
-from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.dataset import DESCRIPTION_FILE
+from bowdenfit.errors import BowdenfitError, Faults, UsageError
+from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.pages.page import render_section
 from bowdenfit.pages.section import Picture, prose_section
 from bowdenfit.questions import watch as watch_room
 from bowdenfit.questions.watch.verb import watch
+from bowdenfit.words import capitalized
 
 _TICK = 0.5  # s between two looks at what is known; a judgement
 _MOST_LINES = 2000  # of what is printed, that a page keeps; a judgement
@@ -31,7 +35,7 @@ class WatchedBench:
     """
 
     def __init__(self, folder: Path, until: str) -> None:
-        self.until, self.printed, self.refusal, self.version = until, "", "", 0
+        self.until, self.printed, self.refusal, self.unreadable, self.version = until, "", "", "", 0
         self.history: Any = watch_room.History()
         self._folder, self._stopped = folder, threading.Event()
         answers = watch(folder, until=until or None, is_stopped=self._stopped.is_set)
@@ -61,7 +65,9 @@ class WatchedBench:
         """Yield answers, which the history has from then on."""
         for answer in answers:
             if isinstance(answer, watch_room.WatchedAnswer):
-                self.history = self.history.add(answer)
+                self.history, self.unreadable = self.history.add(answer), ""
+            else:
+                self.unreadable = answer.why
             yield answer
 
 
@@ -95,13 +101,24 @@ class LivePage:
         with self._place:
             if bench is not None and bench.running:
                 with block("div", "row"):
-                    text("Watching.", classes="state good")
+                    state = "What was measured cannot be read." if bench.unreadable else "Watching."
+                    text(state, classes=f"state {'bad' if bench.unreadable else 'good'}", role="status")
                     button("Stop watching", self._stop)
+                if bench.unreadable:
+                    refused(f"{bench.unreadable}\nCorrect it in the file; watching goes on.")
                 return
-            with field("Stop at a standard deviation of", "until", "such as 10mm; empty: as `next` advises"):
+            with field("Stop at a standard deviation of", "until", f"such as {self._example}; if empty, when enough is known"):
                 text_input("until", self._until, self._state_until)
             with block("div", "row"):
                 button("Watch the bench", lambda: attempt(self._start), "primary")
+
+    @property
+    def _example(self) -> str:
+        """A standard deviation that this cable can be known to: of its best length, or of a coefficient."""
+        with suppress(BowdenfitError):
+            route = load_description(self._workbench.data_set(self._name) / DESCRIPTION_FILE, faults=Faults()).route
+            return f"10{route.unit}" if route is not None else "0.005"
+        return "0.005"
 
     def _state_until(self, typed: str) -> None:
         self._until = typed.strip()
@@ -123,16 +140,33 @@ class LivePage:
         if bench is None or bench.version == self._shown:
             return
         self._shown = bench.version
-        if not bench.running:
-            self._draw()
+        self._draw()
         words = await self._workbench.compute(_render_history, bench)
         self._known.clear()
         with self._known:
+            if bench.history.answers:
+                _show_headline(bench.history.answers[-1])
             if bench.refusal:
                 text(page_words(bench.refusal), "p", "fault", role="alert")
             markup(words, "div", id="history")
             with section("As the command line prints it", "lines"):
                 text(page_words(bench.printed), "pre", tabindex="0", role="log", id="printed")
+
+
+def _show_headline(answer: Any) -> None:
+    """Show the answer and its verdict, large enough for the other side of a bench."""
+    _, _, words = watch_room.describe_answer(answer).rstrip("; ").partition("  ")
+    text(words, "p", "live-answer", id="live-answer")
+    if answer.trusted is not None:
+        verdict = capitalized(watch_room.describe_verdict(answer).rstrip("."))
+        text(f"{verdict}.", "p", f"live-verdict state {_kind(answer)}")
+
+
+def _kind(answer: Any) -> str:
+    """Return how the verdict is colored."""
+    if answer.warning:
+        return "bad"
+    return "doubtful" if answer.doubts else "good"
 
 
 def _render_history(bench: WatchedBench) -> str:

@@ -117,9 +117,9 @@ def test_two_cables_stand_side_by_side_and_a_bench_is_watched(chromium, tmp_path
         assert faults_of(page) == []
         page.goto(f"{visit.root}/live/worn")
         page.get_by_role("button", name="Watch the bench").click()
-        page.get_by_text("5 mountings: mu").wait_for(timeout=180_000)
+        page.locator("#live-answer", has_text="5 mountings: mu").wait_for(timeout=180_000)
         mount(tmp_path / "worn", 0.70, 5)
-        page.get_by_text("6 mountings: mu").wait_for(timeout=180_000)
+        page.locator("#live-answer", has_text="6 mountings: mu").wait_for(timeout=180_000)
         assert faults_of(page) == []
         page.get_by_role("button", name="Stop watching").click()
         page.get_by_role("button", name="Watch the bench").wait_for()

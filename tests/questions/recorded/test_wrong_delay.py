@@ -10,7 +10,7 @@ import bowdenfit as bf
 RISES = Truth(0.3, 25.0, 0.01, 0.3, 8.0, 0.002, SPEED)  # friction that rises toward standstill
 
 
-@pytest.mark.extended
+@pytest.mark.slow
 def test_wrong_delay_is_named_and_the_one_to_state_is_right(tmp_path):
     write_bench(tmp_path / "rope", "lugre", RISES, slower=2)
     fit = bf.fit(tmp_path / "rope", mcmc=False, figures=False)

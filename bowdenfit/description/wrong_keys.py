@@ -90,6 +90,8 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
         return f"{file}: unknown key {shown('.'.join(where))}{suggest_name(where[-1][:80], _siblings(model, where[:-1]))}"
     if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
         return f"{place}: the unit is missing; write one, such as {_with_unit(error['input'].get('value'), where[:-1], units)}."
+    if error["type"] == "missing" and "exclude" in where:
+        return f"{place}: missing; say which rows are left out and why, {{ rows = [7], reason = \"the rope jumped\" }}."
     if error["type"] == "missing":
         return f"{file}: the key {'.'.join(where)!r} is missing; {remedy}."
     if error["type"] == "model_type":

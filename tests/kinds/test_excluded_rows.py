@@ -76,6 +76,11 @@ def test_without_rows_or_a_reason_nothing_is_left_out(bench, exclude):
         bf.read(bench(exclude))
 
 
+def test_a_missing_reason_is_asked_for(bench):
+    with pytest.raises(DescriptionError, match=r"exclude\.0\.reason: missing; say which rows are left out and why"):
+        bf.read(bench("{ rows = [3] }"))
+
+
 def test_of_several_files_the_entry_says_which(bench):
     files = ("a.csv", "b.csv")
     with pytest.raises(DescriptionError, match="exclude must say of which file its rows are"):

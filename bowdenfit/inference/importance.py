@@ -140,7 +140,8 @@ def sample(request: SamplingRequest, densities: Densities) -> Chain:
         derived = {name: np.concatenate([derived.get(name, values[:, :0]), values], axis=1) for name, values in more.items()}
         chain = _make_chain(request, z, {name: z[..., i] for i, name in enumerate(names)}, derived, log_ratio)
         request.report(Progress(log_ratio.size, request.settings.max_steps, *worst_diagnostics(chain), "importance"))
-        if not chain.reasons or chain.acceptance < _LEAST_EFFICIENCY or chain.steps + _DRAWS > request.settings.max_steps:
+        hopeless = chain.acceptance < _LEAST_EFFICIENCY or chain.pareto_k == float("inf")
+        if not chain.reasons or hopeless or chain.steps + _DRAWS > request.settings.max_steps:
             return chain
 
 

@@ -46,13 +46,16 @@ def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarra
     """Return smoothed log weights, whose exponentials sum to 1, and Pareto k.
 
     Ratios that cannot be computed have no weight; equal ratios give equal weights and k = 0. If a handful of draws carry so
-    much weight, or so many draws are identical, that no Pareto distribution can be fitted, weights are equal and k is infinite.
+    much weight, or so many draws are identical, that no Pareto distribution can be fitted, or no ratio can be computed, weights
+    are equal and k is infinite.
 
     Args:
         log_ratio: Log importance ratio of every draw, up to a constant.
         share: Effective draws per draw.
     """
     usable, equal = np.isfinite(log_ratio), np.full(len(log_ratio), -np.log(len(log_ratio)))
+    if not usable.any():
+        return equal, float("inf")
     ratios = np.where(usable, log_ratio, np.max(log_ratio[usable], initial=0.0) - _NO_WEIGHT)
     if not np.ptp(ratios) > _FLAT:
         return equal, 0.0

@@ -56,6 +56,13 @@ def test_bent_target_is_drawn_as_it_is():
         assert abs(np.mean(shares) - 0.05) < limit * np.sqrt(0.05 * 0.95 / (1000 * SEEDS))
 
 
+@pytest.mark.parametrize("value", [jnp.nan, -jnp.inf])
+def test_a_density_that_cannot_be_computed_anywhere_near_is_refused(value):
+    chain = draw(lambda z: jnp.where(jnp.abs(z[0]) > 1e6, 0.0, value), ("a", "b"), 1)
+    assert chain.pareto_k == np.inf and "Pareto k is inf" in chain.reasons[0]
+    assert chain.steps == 512
+
+
 def test_target_beyond_reach_is_refused_early():
     """Eight Cauchy distributions: no mixture of Student distributions of five degrees of freedom bounds their weights."""
     chain = draw(lambda z: -jnp.sum(jnp.log1p(z**2)), tuple("abcdefgh"), 1)

@@ -135,6 +135,11 @@ def is_unit(text: str) -> bool:
     return True
 
 
+def measures(unit: str, dimension: str) -> bool:
+    """Return whether `unit` is a unit of a kind of quantity, such as "force"."""
+    return is_unit(unit) and dimension_of(unit) == dimension
+
+
 def multiple_of(text: str) -> tuple[str, str] | None:
     """Return the factor and the unit of a multiple of ten in the place of a unit, such as "x10 N"; None for any other text."""
     match = _MULTIPLE.fullmatch(text.strip())
@@ -163,7 +168,7 @@ def speed_dimension(unit: str) -> str:
 
     Anything else counts as one of the rope, and is refused when it is converted.
     """
-    return "angular_velocity" if is_unit(unit) and dimension_of(unit) == "angular_velocity" else "velocity"
+    return "angular_velocity" if measures(unit, "angular_velocity") else "velocity"
 
 
 def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float:

@@ -13,7 +13,7 @@ from functools import lru_cache
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.clocks import names_time, unit_of_time
 from bowdenfit.files.spellings import parse_heading
-from bowdenfit.units import ColumnSource, differing_units, dimension_of, is_unit, weight_of
+from bowdenfit.units import ColumnSource, differing_units, is_unit, measures, weight_of
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
@@ -225,7 +225,7 @@ def rank_headings(headings: Sequence[tuple[str, str]], dimension: str) -> list[i
     ranks = list[tuple[int, int]]()
     for i, (heading, below) in enumerate(headings):
         unit = heading_of(heading, below).unit
-        fits = is_unit(unit) and dimension_of(unit) == dimension
+        fits = measures(unit, dimension)
         weighs = dimension == "force" and bool(weight_of(unit))
         rank = 0 if fits else 1 if weighs else 2 if not unit else 3
         if heading and (dimension == "time" or not names_time(heading) or parse_heading(heading, below)):

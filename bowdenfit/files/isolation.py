@@ -226,14 +226,17 @@ def serve(scratch: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print
+    exit_code = 1
     try:
         for line in sys.stdin.buffer:
             path, memory, seconds, name, arguments = json.loads(line)
             _limit_process(memory, seconds)
             answers.write(pickle.dumps(_call(name, Path(path), arguments), protocol=5))
             answers.flush()
-    finally:
+        exit_code = 0
+    finally:  # at once: a pipe that is closed before Python ends would have the process killed, as one that took too long
         shutil.rmtree(scratch, ignore_errors=True)
+        os._exit(exit_code)
 
 
 def _call(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:

@@ -19,7 +19,7 @@ from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
 from bowdenfit.kinds.forces.stated_noise import FORCE_SDS
 from bowdenfit.kinds.forces.table import count_loads
-from bowdenfit.units import conversion_factor, dimension_of, is_unit
+from bowdenfit.units import conversion_factor, dimension_of, is_unit, measures
 from bowdenfit.words import shown
 
 _FIRST_BYTES = 1 << 15  # bytes in which a file may state its wrap angle
@@ -192,7 +192,7 @@ def _has_one_force_and_a_position(table: RawTable) -> bool:
     headings = _headings(table)
     counts = {name: len(columns) for name, columns in find_candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
     units = [heading_of(heading, unit).unit for heading, unit in headings]
-    forces = sum(unit is not None and is_unit(unit) and dimension_of(unit) == "force" for unit in units)
+    forces = sum(unit is not None and measures(unit, "force") for unit in units)
     at_motor = counts["force"] + counts["input_force"] == 1 and not counts["output_force"]
     return at_motor and forces <= 1 and counts["displacement"] + counts["position"] == 1
 

@@ -15,7 +15,7 @@ from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, find_stated_angle, guess_file_kind
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, FileColumn, LoneFile
 from bowdenfit.recordings.forces import likely_clock_unit
-from bowdenfit.units import ColumnSource, dimension_of, is_unit, multiple_of, weight_of
+from bowdenfit.units import ColumnSource, measures, multiple_of, weight_of
 from bowdenfit.words import listed, shown
 
 _SPREAD = re.compile(
@@ -173,9 +173,8 @@ def _name_forces(
     best = remaining[: len(missing)]
     best = best if in_order else sorted(best, key=lambda column: -column.mean)  # a pulled cable loses force
     ends |= dict(zip(missing, best, strict=False))
-    provided = [
-        f"{shown(ends[name].name)} is the {name}" for name in missing if name in ends and not _measures(ends[name], "torque")
-    ]
+    as_force = [name for name in missing if name in ends and not measures(ends[name].written_unit, "torque")]
+    provided = [f"{shown(ends[name].name)} is the {name}" for name in as_force]
     if provided and len(remaining) > len(best):
         also = listed([shown(column.name) for column in remaining[len(best) :][:_MOST_NAMED]])
         provided[-1] += f" rather than {also}"
@@ -188,7 +187,7 @@ def _name_forces(
     options = []
     for name in [name for name in unnamed if name not in multiples]:
         unit = weight_of(ends[name].written_unit) or ("" if ends[name].written_unit else "N")
-        if _measures(ends[name], "torque"):
+        if measures(ends[name].written_unit, "torque"):
             end = name.removesuffix("_force")
             options += [(option, _naming(f"{end}_torque", ends[name].name)), ("--set", radius_setting(end))]
             provided.append(f"{shown(ends[name].name)} is the torque of a pulley of 15 mm at the {end}")
@@ -208,8 +207,8 @@ def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]
     """
     units = {column.name: column.written_unit for column in columns}
     measured = [column for column in columns if not (_SPREAD.search(column.name) or column.is_index)]
-    of_force = [column for column in measured if _measures(column, "force")]
-    of_torque = [column for column in measured if _measures(column, "torque")]
+    of_force = [column for column in measured if measures(column.written_unit, "force")]
+    of_torque = [column for column in measured if measures(column.written_unit, "torque")]
     of_weight = [column for column in measured if weight_of(units[column.name])]
     without_unit = [column for column in measured if not units[column.name]]
     signals = [column for column in measured if units[column.name] and column.dimension in ("", "other", "ratio")]
@@ -217,11 +216,6 @@ def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]
     for group in (of_force, of_weight, of_torque, without_unit, [column for column in signals if column not in of_weight]):
         likely += group if len(likely) < least else []
     return likely
-
-
-def _measures(column: FileColumn, dimension: str) -> bool:
-    """Return whether a column states a unit of a dimension, such as "force"."""
-    return is_unit(column.written_unit) and dimension_of(column.written_unit) == dimension
 
 
 def make_ambiguity_error(file: LoneFile) -> DatasetError:

@@ -21,7 +21,7 @@ from bowdenfit.recordings.named_channels import (
     stated_unit,
 )
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.units import INTERNAL_UNITS, ColumnSource, dimension_of, is_unit, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ColumnSource, measures, speed_dimension
 from bowdenfit.words import quoted, shown
 
 _FORCES = ("input_force", "output_force")
@@ -227,7 +227,7 @@ def _find_end(
 
 
 def _is_force(channel: Channel) -> bool:
-    return bool(channel.unit) and is_unit(channel.unit) and dimension_of(channel.unit) == "force"
+    return measures(channel.unit, "force")
 
 
 def _refuse_output_clock(file: ChannelFile, sources: Mapping[str, ColumnSource]) -> None:
@@ -303,8 +303,7 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
         return DatasetError(f"{has} {other}")
     name, below = headings[likely[0]]
     unit = unit_to_state(name, below, "N")
-    unit_there = heading_of(name, below).unit
-    if is_unit(unit_there) and dimension_of(unit_there) == "torque":
+    if measures(heading_of(name, below).unit, "torque"):
         end = quantity.removesuffix("_force")
         return DatasetError(
             f"{has} If {shown(name)} is the torque of the pulley at the {end}, name it and state the radius: "

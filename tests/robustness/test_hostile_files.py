@@ -278,6 +278,16 @@ def test_an_interrupted_request_does_not_answer_the_next_one_and_a_dead_reader_i
     assert read_channels(tmp_path / "2.mat").channels[0].values[0] == 2
 
 
+def test_a_reader_that_fails_is_no_file_that_takes_too_long(tmp_path, monkeypatch):
+    slow = "import time\nclass Slow:\n    def __del__(self):\n        time.sleep(0.5)\nslow = Slow()\n"
+    (tmp_path / "reader_that_fails.py").write_text(f"{slow}def read(path):\n    raise SystemError('no object')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    isolation._end_reader()
+    (tmp_path / "a.mat").write_bytes(b"x")
+    with pytest.raises(bf.DatasetError, match="the library that reads such files crashed on it"):
+        isolation.call_isolated(tmp_path / "a.mat", "reader_that_fails:read")
+
+
 def test_readers_that_have_nothing_to_do_hold_no_output_of_ours(tmp_path):
     scipy.io.savemat(tmp_path / "good.mat", {"F": np.arange(5.0)})
     ours, theirs = os.pipe()

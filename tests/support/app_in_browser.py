@@ -11,7 +11,15 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from offline_browser import FAULTS
+
+_ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one footer")  # what an app has, and a report has not
 PATIENCE = 60_000  # ms; a machine with other work on it loads JAX slowly
+
+
+def faults_of(page):
+    """What is wrong with a page: contrast, names of controls, headings, width."""
+    return [fault for fault in page.evaluate(FAULTS) if not fault.startswith(_ALLOWED)]
 
 
 class Served:

@@ -158,8 +158,8 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
 
 def _stop_first(advice: PageSection, stop: str) -> PageSection:
     """Return the advice with what it says of stopping above all, as the heading asks."""
-    others = tuple(sentence for sentence in advice.context["sentences"] if sentence != stop)
-    return replace(advice, context={**advice.context, "headline": stop, "sentences": others})
+    remaining = tuple(sentence for sentence in advice.context["sentences"] if sentence != stop)
+    return replace(advice, context={**advice.context, "headline": stop, "sentences": remaining})
 
 
 def show_files(name: str) -> None:

@@ -60,14 +60,14 @@ def sketch_file(file: MeasuredFile) -> Picture | None:
     forces = [meanings[name] for name in ("input_force", "output_force") if name in meanings]
     if len(columns) < 2:
         return None
-    first, *others = forces if len(forces) == 2 else columns
+    first, *upward = forces if len(forces) == 2 else columns
     labels = {column.name: f"{column.name} ({column.unit})" if column.unit else column.name for column in columns}
     points = [
         Points(labels[column.name], color, "points", first.values, column.values)
-        for column, color in zip(others, COLORS, strict=False)
+        for column, color in zip(upward, COLORS, strict=False)
     ]
-    units = list(dict.fromkeys(column.unit for column in others[: len(COLORS)]))
-    y_label = labels[others[0].name] if len(others) == 1 else f"({units[0]})" if len(units) == 1 and units[0] else "As written"
+    units = list(dict.fromkeys(column.unit for column in upward[: len(COLORS)]))
+    y_label = labels[upward[0].name] if len(upward) == 1 else f"({units[0]})" if len(units) == 1 and units[0] else "As written"
     chart = make_chart(file.name, labels[first.name], y_label, points)
     caption = "As written in the file; what is not answered yet is not applied."
     return Picture("sketch", file.name, "", (chart,), caption, alone=True)

@@ -120,17 +120,17 @@ def _list_topic(key: str, schema: Schema, stated: Any) -> Iterator[FormGroup]:
 def _list_fields(target: Schema, values: Mapping[str, Any], path: Path, above: str = "") -> Iterator[FormField]:
     """Yield the fields of an object; parts of it that are objects themselves are taken apart."""
     for key, schema in target.get("properties", {}).items():
-        part, stated = _resolve(schema), values.get(key)
+        part, value = _resolve(schema), values.get(key)
         here = (*path, key)
         if "properties" in part and "unit" not in part["properties"] and _is_single(schema):
-            yield from _list_fields(part, stated if isinstance(stated, Mapping) else {}, here, f"{above}{key}.")
+            yield from _list_fields(part, value if isinstance(value, Mapping) else {}, here, f"{above}{key}.")
             continue
         if "curve" in part.get("properties", {}):  # a wrap angle, key by key
-            yield from _list_fields(part, stated if isinstance(stated, Mapping) else {}, here, f"{above}{key}.")
+            yield from _list_fields(part, value if isinstance(value, Mapping) else {}, here, f"{above}{key}.")
             continue
         kind, options = _kind_of(schema)
         yield FormField(
-            here, f"{above}{key}", kind, "" if stated is None else show_value(stated), _hint(key, schema, kind), options,
+            here, f"{above}{key}", kind, "" if value is None else show_value(value), _hint(key, schema, kind), options,
             key in target.get("required", ()),
         )  # fmt: skip
 
@@ -245,8 +245,8 @@ def add_part(text: str, topic: str, name: str) -> str:
     """
     name = name.strip()
     document = _parse(text)
-    stated = document.get(topic)
-    names = [entry.get("name") for entry in stated or ()] if topic == "contact" else list(stated or ())
+    entries = document.get(topic) or ()
+    names = [entry.get("name") for entry in entries] if topic == "contact" else list(entries)
     if not name or name in names:
         raise UsageError(f"write a name that is not in use yet{': ' + ', '.join(map(str, names)) if names else ''}.")
     new = tomlkit.table()

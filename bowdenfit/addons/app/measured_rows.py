@@ -128,8 +128,8 @@ def _list_file_rows(source: Source, path: Path, refusals: Sequence[Refusal]) -> 
     for cells in table.rows:
         number = cells[0].row
         state = LEFT_OUT if number in excluded else REFUSED if number in refused else READ
-        why = excluded.get(number) or refused.get(number, "")
-        rows.append(FileRow(number, tuple(cell.text for cell in cells), state, why))
+        reason = excluded.get(number) or refused.get(number, "")
+        rows.append(FileRow(number, tuple(cell.text for cell in cells), state, reason))
     return FileRows(source.kind, source.name_of(path), table.header, tuple(rows))
 
 

@@ -3,11 +3,10 @@
 import tomllib
 
 import pytest
-from app_in_browser import served, visiting
+from app_in_browser import faults_of, served, visiting
 from half_turn_bench import TABLE, describe_half_turn
-from offline_browser import FAULTS, browser
+from offline_browser import browser
 
-ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one footer")  # what an app has, and a report has not
 pytestmark = pytest.mark.extended
 
 
@@ -16,11 +15,6 @@ def chromium():
     """A browser; tests are skipped where there is none."""
     with browser() as program:
         yield program
-
-
-def faults_of(page):
-    """What is wrong with a page: contrast, names of controls, headings, width."""
-    return [fault for fault in page.evaluate(FAULTS) if not fault.startswith(ALLOWED)]
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])

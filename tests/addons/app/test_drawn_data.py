@@ -1,13 +1,12 @@
 """Data are seen before a fit: a click on a point shows its row, which is left out with a reason, and taken in again."""
 
 import pytest
-from app_in_browser import served, visiting
+from app_in_browser import faults_of, served, visiting
 from half_turn_bench import describe_half_turn
-from offline_browser import FAULTS, browser
+from offline_browser import browser
 
 import bowdenfit as bf
 
-ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one footer")  # what an app has, and a report has not
 ROWS = "input_force_N,output_force_N,run\n20,15.2,1\n40,30.1,1\n60,45.6,1\n20,15.0,2\n40,30.9,2\n60,46.0,2\n"
 pytestmark = pytest.mark.extended
 
@@ -17,11 +16,6 @@ def chromium():
     """A browser; tests are skipped where there is none."""
     with browser() as program:
         yield program
-
-
-def faults_of(page):
-    """What is wrong with a page: contrast, names of controls, headings, width."""
-    return [fault for fault in page.evaluate(FAULTS) if not fault.startswith(ALLOWED)]
 
 
 def click_at(page, figure, x):

@@ -268,7 +268,7 @@ def collect_answers(fit: Record) -> dict[str, Any]:
     if fit.sampled is not None:
         answers["identify"] = serialize(vars(assess_identifiability(fit)))
         if (route := fit.dataset.description.route) is not None:
-            answers["length"] = serialize(fit.optimal_length())
+            answers["length"] = serialize(find_optimal_length(fit))
             if route.choices:
                 rows = predict_at_lengths(fit, np.asarray(route.choices), None, "pull")
                 answers["predict"] = [[length, serialize(row)] for length, row in zip(route.choices, rows, strict=True)]

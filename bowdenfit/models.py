@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +23,13 @@ from bowdenfit.description import (
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, suggest_name
+from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.covariates import Covariates, collect_covariates
+from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.tables import AngleTable, Measurements
-from bowdenfit.kinds.term import Term
-from bowdenfit.kinds.terms import collect_parameters, iterate_term_kinds, make_measured_cable
+from bowdenfit.kinds.term import Term, find_row_angles
+from bowdenfit.kinds.terms import TERMS, collect_parameters, iterate_term_kinds, make_measured_cable
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.parameters.symbols import make_symbol
@@ -40,6 +44,7 @@ class Model(Display):
     space: ParameterSpace
     terms: tuple[Term, ...]
     covariates: Mapping[str, Covariates] = field(default_factory=dict, compare=False)
+    measurements: Measurements = field(default_factory=Measurements, compare=False)
 
     @property
     def description(self) -> Description:
@@ -50,6 +55,13 @@ class Model(Display):
     def is_slow(self) -> bool:
         """Whether one log density takes milliseconds; see `Term`."""
         return any(getattr(term, "is_slow", False) for term in self.terms)
+
+    def terms_with_error(self, error: BenchError) -> tuple[Any, ...]:
+        """Return all terms with the data that a bench with a systematic error would have given."""
+        tables = {kind.name: kind.with_bench_error(table, error) for kind, table in iterate_tables(self.measurements)}
+        angles = Measurements(tuple(tables.values())).table(AngleTable)
+        terms: list[Any] = [t for name, table in tables.items() for t in TERMS[name].terms(self.cable, table, angles)]
+        return tuple(replace(term, data=_with_constant_angles(term.data, self.cable, error)) for term in terms)
 
     def sentences(self) -> list[str]:
         """Free parameters and readings by table."""
@@ -76,7 +88,23 @@ def build_model(dataset: Dataset) -> Model:
     for kind, table in kinds:
         kind.check(table, space)
     places = {term.name: collect_covariates(description, measurements, term) for term in terms}
-    return Model(cable, space, tuple(terms), places)
+    return Model(cable, space, tuple(terms), places, measurements)
+
+
+def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) -> Any:
+    """Return data of a term whose rows also hold the constant wrap angles of cable.toml, those without a stated error."""
+    if isinstance(data, RunsData):
+        return replace(data, cells=_with_constant_angles(data.cells, cable, error))
+    angles = find_row_angles(data)
+    if angles is None:
+        return data
+    own_angles, is_own = np.array(angles.own, dtype=float), np.array(angles.is_own)
+    for k, contact in enumerate(cable.description.contact):
+        constant = contact.wrap_angle.constant
+        if constant is not None and constant.sd is None:
+            own_angles[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
+            is_own[..., k] = True
+    return replace(data, angles=replace(angles, own=own_angles, is_own=is_own))
 
 
 def _build_space(cable: CableContacts, measurements: Measurements) -> ParameterSpace:

@@ -82,7 +82,10 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
     "friction": "friction_model",
     "noise": "noise",
 }
-_NO_ERRORS = ("errors.gain=0", "errors.hysteresis=0", "errors.angle={value=0,unit='deg'}", "errors.angle_scale=0")
+_NO_ERRORS = (
+    "errors.angle={value=0,unit='deg'}",
+    *(f"errors.{name}=0" for name in ("angle_scale", "gain", "hysteresis", "load_exponent", "wear")),
+)
 
 
 @read_first

@@ -23,6 +23,7 @@ from jax import Array
 from scipy.special import fdtrc, stdtr
 
 from bowdenfit.cable.departure import DEPARTURE_SHARES
+from bowdenfit.inference.bench_errors import learn_at_minimum
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Solution
@@ -115,7 +116,7 @@ def find_departures(
         reach: Half of the 90 % interval of each identified parameter, in its shown unit.
     """
     model = basin.problem.posterior.model
-    reweighed = _reweigh_by_scatter(basin, model, scale)
+    reweighed = _correct_bench_errors(basin, _reweigh_by_scatter(basin, model, scale))
     system = group_residuals(model, reweighed)
     candidates = [departure for readings in system.readings for departure in _test_departures(system, readings)]
     candidates += _test_curves(basin.problem.posterior, reweighed, system)
@@ -194,6 +195,23 @@ def _reweigh_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
             start += count
     reweighed = problem.solve(solution["z"], basin.at_end, pin)
     return reweighed if reweighed["succeeded"] and np.all(np.isfinite(reweighed["jacobian"])) else solution
+
+
+def _correct_bench_errors(basin: Basin, solution: Solution) -> Solution:
+    """Return a solution without what errors of the bench explain of its residuals, as far as their limits let them.
+
+    What such an error explains is no lack of fit: the answers include it.
+    """
+    learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end)
+    if learned is None:
+        return solution
+    explained = (learned.columns + solution["jacobian"] @ learned.moves) @ learned.mean
+    residuals, start = {}, 0
+    for table, of_table in solution["residuals"].items():
+        residuals[table] = of_table + explained[start : start + len(of_table)]
+        start += len(of_table)
+    inside = {table: columns @ learned.mean for table, columns in learned.inside.items()}
+    return solution | {"residuals": residuals, "inside": inside}
 
 
 def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterator[Departure]:

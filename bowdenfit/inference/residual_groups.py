@@ -90,7 +90,8 @@ def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups
 
     Args:
         model: The model.
-        solution: The minimum: residuals and expected readings by term, Jacobian, values.
+        solution: The minimum: residuals and expected readings by term, Jacobian, values; and `inside`, by term, what is added
+            to residuals of readings inside runs, where errors of the bench are corrected.
     """
     return _weigh_by_scatter(_collect_blocks(model, solution))
 
@@ -154,6 +155,8 @@ def _collect_blocks(model: Model, solution: Mapping[str, Any]) -> list[ResidualG
         unused = tuple(covariates.unused) if covariates is not None else ()
         for block in _make_blocks(term, covariates, *of_term, solution["readings"][term.name], values):
             stop = start + len(block.residuals)
+            if block.inside and "inside" in solution:
+                block = replace(block, residuals=block.residuals + solution["inside"][term.name])
             blocks.append(replace(block, rows=slice(start, stop), unused=unused))
             start = stop
     return blocks

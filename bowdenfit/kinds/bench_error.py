@@ -1,12 +1,18 @@
-"""Systematic errors of a whole bench, as its tables would show them: what no reading of that bench can tell by itself."""
+"""Systematic errors of a whole bench, as its tables would show them, and how large they may be."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import sqrt
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
+from bowdenfit.description import Description
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Labels, Vector
+
+STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 
 
 @dataclass(frozen=True)
@@ -19,12 +25,16 @@ class BenchError:
             force [1]: half of it is taken off while pulling, and half is added while returning.
         angle_scale: Relative error of all wrap angles [1].
         angle_offset: Error that all wrap angles share [rad].
+        wear: Change of friction from the first mounting, or row, to the last, relative to its middle [1].
+        load_exponent: Exponent by which friction grows with the load, beyond the model's; none at the middle load [1].
     """
 
     gain: float = 0.0
     hysteresis: float = 0.0
     angle_scale: float = 0.0
     angle_offset: float = 0.0
+    wear: float = 0.0
+    load_exponent: float = 0.0
 
     def apply_to_force(self, output_force: Vector, stroke: Vector | Labels | float = 1.0) -> Vector:
         """Return output forces [N], or efficiencies, as the bench would read them.
@@ -35,6 +45,20 @@ class BenchError:
         """
         return output_force * (1 + self.gain) * (1 - self.hysteresis * np.asarray(stroke) / 2)
 
+    def apply_to_friction(self, input_force: Vector | float, output_force: Vector, order: Vector | float = 0.0) -> Vector:
+        """Return output forces of sliding readings as friction would make them that is worn, or depends on the load.
+
+        Args:
+            input_force: Input force [N], or 1 for efficiencies.
+            output_force: Output force [N], or efficiency.
+            order: When each was read, from -0.5 for the first to 0.5 for the last.
+        """
+        load = 0.5 * np.log(np.maximum(input_force * output_force, 1e-300))
+        factor = (1 + self.wear * np.asarray(order)) * np.exp(self.load_exponent * (load - np.median(load)))
+        taut = (output_force > 0) & (np.asarray(input_force) > 0)
+        ratio = np.where(taut, output_force / np.where(taut, input_force, 1.0), 1.0)
+        return np.where(taut, input_force * ratio**factor, output_force)
+
     def apply_to_angles(self, angle: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
         """Return wrap angles [rad] as the bench would read them; an angle of 0, and one that is not known, stays."""
         return np.where(angle > 0, angle * (1 + self.angle_scale) + self.angle_offset, angle)
@@ -42,3 +66,61 @@ class BenchError:
     def apply_to_rows(self, own: OwnAngles) -> OwnAngles:
         """Return wrap angles measured with rows; one with a standard deviation stays, because its error is in the fit."""
         return replace(own, angle=np.where(np.isnan(own.sd), self.apply_to_angles(own.angle), own.angle))
+
+
+def order_of(number: Labels, count: int) -> Vector:
+    """Return the order of mountings or rows from -0.5 to 0.5; 0 where there is only one.
+
+    Args:
+        number: Number of each, from 0.
+        count: How many there are.
+    """
+    return number / max(count - 1, 1) - 0.5 if count > 1 else np.zeros(len(number))
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """One cause of error.
+
+    Args:
+        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear" or "load exponent".
+        words: The same with how well it is known.
+        steps: Small errors of the readings that stand for it, each with its standard uncertainty in such steps.
+        cells: How many independent errors within the same limits add up to it: 2 for two load cells.
+    """
+
+    name: str
+    words: str
+    steps: Mapping[BenchError, float]
+    cells: int = 1
+
+    JSON: ClassVar = ("name", "words")
+
+
+def iterate_error_sources(description: Description) -> Iterator[ErrorSource]:
+    """Yield each source of error with its standard uncertainty.
+
+    Between limits of +-a every value is as likely (GUM 4.3.7), which makes a standard uncertainty of a/sqrt(3); two load cells
+    have errors of their own.
+    """
+    limits, sensors = description.errors, description.sensors
+    angles = {
+        f"{limits.angle.value:g} {limits.angle.unit}": (BenchError(angle_offset=STEP), limits.angle.to("angle")),
+        f"{100 * limits.angle_scale:g} %": (BenchError(angle_scale=STEP), limits.angle_scale),
+    }
+    known_to = {words: (step, limit / sqrt(3) / STEP) for words, (step, limit) in angles.items() if limit}
+    if known_to:
+        yield ErrorSource("wrap angles", f"wrap angles known to {' and '.join(known_to)}", dict(known_to.values()))
+    of_both_cells = sqrt(2 / 3) / STEP
+    if limits.gain and sensors.gain_sd is None:
+        words = f"a gain of each load cell known to {100 * limits.gain:g} %"
+        yield ErrorSource("gain", words, {BenchError(gain=STEP): limits.gain * of_both_cells}, 2)
+    if limits.hysteresis:
+        words = f"a hysteresis of each load cell of up to {100 * limits.hysteresis:g} %"
+        yield ErrorSource("hysteresis", words, {BenchError(hysteresis=STEP): limits.hysteresis * of_both_cells}, 2)
+    if limits.wear:
+        words = f"wear of up to {100 * limits.wear:g} %"
+        yield ErrorSource("wear", words, {BenchError(wear=STEP): limits.wear / sqrt(3) / STEP})
+    if limits.load_exponent:
+        words = f"a load exponent within {limits.load_exponent:g}"
+        yield ErrorSource("load exponent", words, {BenchError(load_exponent=STEP): limits.load_exponent / sqrt(3) / STEP})

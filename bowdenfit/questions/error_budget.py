@@ -1,70 +1,47 @@
-r"""The error budget: what errors of a whole bench, which none of its readings can show, add to each interval.
+r"""The error budget: what errors of a whole bench, which its readings may not show, add to each interval.
 
-An interval of the posterior holds what scatters. A bend angle that is 3 % too large, a load cell with another gain, or one with
-hysteresis shifts every reading alike, and metrology adds it as an uncertainty of type B:
-
-.. math:: u^2(f) = u_A^2(f) + \sum_e \left(\frac{\partial \mathrm{E} f}{\partial e} u_e\right)^2
-
-The slope of a posterior mean by an error e of the data is a covariance over the draws, without a refit:
-
-.. math:: \frac{d \mathrm{E} f}{d e} = \mathrm{Cov}\!\left(f, \frac{\partial \log p(y_e \mid z)}{\partial e}\right)
+An interval of the posterior holds what scatters. A wrap angle that is 3 % too large, a load cell with another gain, or one with
+hysteresis shifts every reading alike, and metrology adds it as an uncertainty of type B. Here these errors are parameters with
+their limits as priors (`inference/bench_errors.py`): what readings reveal of them corrects the answers, and the rest widens
+them. Answers are calculated from draws that are moved by draws of the errors.
 
 References:
     JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement (GUM), 4.3 and 5.1.
-    Giordano, Broderick and Jordan, Covariances, robustness, and variational Bayes, Journal of Machine Learning Research 19
-    (2018), 51: the covariance as a derivative of a posterior mean.
+    JCGM 101:2008, Supplement 1 to the GUM: propagation of distributions using a Monte Carlo method.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import sqrt
-from typing import Any
+from typing import ClassVar
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
-from jaxtyping import Float
 
-from bowdenfit.cable.cable import CableContacts
 from bowdenfit.display import Display, Rows
-from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.draws import BATCH, run_in_batches
-from bowdenfit.inference.interval import NORMAL_90, Interval
+from bowdenfit.inference.bench_errors import CONTRADICTION, LearnedErrors, learn_errors
+from bowdenfit.inference.draws import for_each_draw, value_function
+from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds import iterate_tables
-from bowdenfit.kinds.bench_error import BenchError
-from bowdenfit.kinds.runs import RunsData
-from bowdenfit.kinds.tables import AngleTable, Measurements
-from bowdenfit.kinds.term import find_row_angles
-from bowdenfit.kinds.terms import TERMS
+from bowdenfit.kinds.bench_error import STEP, ErrorSource
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
+from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
-from bowdenfit.words import filled, listed, table
+from bowdenfit.words import filled, listed, significant, table
 
-_DRAWS = 4096  # a covariance of so many is known to 2 %; more would only take longer
-_STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 _NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then add more than half to it
-# Median deviations at which the score of a draw is cut off: of a normal distribution hardly any is beyond 10, and where scatter
-# is nearly nothing some 5 % of the draws are, so that a shift is at most that much too small; a judgement.
-_FARTHEST_SCORE = 10.0
-TITLE = "Error budget: what bench errors that readings cannot reveal add"
+_LEARNED = 0.5  # share of the uncertainty of an error, below which readings have determined it; a judgement
+_SHOWN_ERRORS = {  # words, unit and factor in which an error is shown, by field of `BenchError`
+    "gain": ("the gain of the output's load cell over that of the input's", "%", 100.0),
+    "hysteresis": ("the hysteresis of the load cells", "%", 100.0),
+    "angle_scale": ("the wrap angles, in proportion,", "%", 100.0),
+    "angle_offset": ("the wrap angles, all alike,", "deg", float(np.rad2deg(1.0))),
+    "wear": ("friction from the first mounting to the last", "%", 100.0),
+    "load_exponent": ("the exponent of the load", "", 1.0),
+}
+TITLE = "Error budget: what bench errors add"
 _INCLUDED = "The intervals of the first page include them."
 KEY_ROLES = ("friction", "friction_model", "angle", "elastic")  # of coefficients that are answers, not means to them
-
-
-@dataclass(frozen=True)
-class ErrorSource:
-    """One cause of error.
-
-    Args:
-        name: Name of the error: "wrap angles", "gain" or "hysteresis".
-        words: The same with how well it is known.
-    """
-
-    name: str
-    words: str
 
 
 @dataclass(frozen=True)
@@ -85,6 +62,13 @@ class BudgetRow:
     bench: Interval
     shifts: Mapping[str, float]
 
+    JSON: ClassVar = (..., "coverage_factor")
+
+    @property
+    def coverage_factor(self) -> float:
+        """Half of the interval with the errors of the bench, over its standard uncertainty (JCGM 101, 3.15) [1]."""
+        return (self.bench.q95 - self.bench.q05) / 2 / self.bench.sd if self.bench.sd > 0 else float("nan")
+
     @property
     def is_notable(self) -> bool:
         """Whether the errors of the bench add more than half to its interval."""
@@ -96,6 +80,40 @@ class BudgetRow:
         return max(self.shifts, key=lambda name: self.shifts[name])
 
 
+@dataclass(frozen=True)
+class LearnedError:
+    """What readings reveal of one error of the bench.
+
+    Args:
+        name: What it is an error of, in words.
+        unit: Its unit.
+        mean: Its estimate.
+        sd: Standard uncertainty that is left of it.
+        limit_sd: Standard uncertainty by its limit alone.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    limit_sd: float
+
+    @property
+    def is_learned(self) -> bool:
+        """Whether the readings determine it to better than half of what was known before."""
+        return self.sd < _LEARNED * self.limit_sd
+
+    @property
+    def contradicts_limit(self) -> bool:
+        """Whether it is beyond its limit, and chance puts one within it there in fewer than one fit in a hundred."""
+        by_chance = CONTRADICTION * np.sqrt(max(self.limit_sd**2 - self.sd**2, 0.0))
+        return abs(self.mean) > max(by_chance, np.sqrt(3) * self.limit_sd)
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{self.name} is off by {significant(self.mean, 2)} ± {significant(self.sd, 1)}{unit}"
+
+
 @dataclass(frozen=True, repr=False)
 class ErrorBudget(Display):
     """Every answer of a fit, by the readings alone and with the usual or stated errors of a bench.
@@ -103,10 +121,12 @@ class ErrorBudget(Display):
     Args:
         sources: Causes of error.
         rows: The answers.
+        learned: What the readings reveal of each error.
     """
 
     sources: tuple[ErrorSource, ...]
     rows: tuple[BudgetRow, ...]
+    learned: tuple[LearnedError, ...] = ()
 
     def row(self, quantity: str) -> BudgetRow | None:
         """Return the row of a quantity; None where there is none."""
@@ -115,13 +135,15 @@ class ErrorBudget(Display):
     def sentences(self) -> list[str]:
         """What the errors of a bench add, in a sentence or two."""
         notable = [row for row in self.rows if row.is_notable]
-        known = listed([source.words for source in self.sources])
-        if not notable:
-            return [f"Bench errors that readings cannot reveal ({known}) add less than half to each interval. {_INCLUDED}"]
-        return [
-            f"Bench errors that readings cannot reveal ({known}) add more than half to the interval of "
-            f"{listed([row.quantity for row in notable])}; state your own under [errors] in cable.toml. {_INCLUDED}"
-        ]
+        limits = listed([source.words for source in self.sources])
+        added = "less than half to each interval"
+        if notable:
+            of_which = listed([row.quantity for row in notable])
+            added = f"more than half to the interval of {of_which}; state your own under [errors] in cable.toml"
+        sentences = [f"Bench errors that readings do not reveal ({limits}) add {added}. {_INCLUDED}"]
+        if revealed := [str(error) for error in self.learned if error.is_learned]:
+            sentences.append(f"The readings reveal that {listed(revealed)}; the answers are corrected for it.")
+        return sentences
 
     def _table(self) -> Rows:
         rows = []
@@ -133,54 +155,84 @@ class ErrorBudget(Display):
 
 
 @cached_per_fit
+def learned_errors(fit: Record) -> LearnedErrors | None:
+    """Return the posterior of the errors of a bench; None without draws, or where no error is left to add."""
+    if fit.sampled is None:
+        return None
+    with jax.enable_x64(True):
+        return learn_errors(LogDensity(fit.model), fit.draws().flat_z.mean(axis=0))
+
+
+@cached_per_fit
+def with_bench_errors(fit: Record) -> Record:
+    """Return a fit whose draws include the errors of the bench; itself where there are none.
+
+    Its draws of parameters, and what follows from them, are those that people copy. What depends on readings, as the log
+    likelihood, is left out: readings have the errors, parameters have not.
+    """
+    learned = learned_errors(fit)
+    if learned is None:
+        return fit
+    draws = fit.draws()
+    z = draws.flat_z + learned.draw(len(draws.flat_z), fit.provenance.seed) @ learned.moves.T
+    shape, programs = draws.z.shape[:-1], fit.programs
+    with jax.enable_x64(True):
+        if programs is None or fit.model.is_slow:  # whose programs simulate all readings
+            values = for_each_draw(value_function(fit.model), z.shape[1], run_once=True)(z)
+        else:
+            values = programs.values(z)
+        if programs is None and draws.optimum:
+            program = for_each_draw(make_optimizer(fit.model), z.shape[1], run_once=True)
+            optimum = dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), program(z), strict=True))
+        else:
+            optimum = programs.find_optimum(z) if programs is not None else {}
+    moved = replace(
+        draws,
+        z=z.reshape(draws.z.shape),
+        values={name: np.asarray(part).reshape(shape) for name, part in values.items()},
+        optimum={name: part.reshape(shape) for name, part in optimum.items()},
+        log_likelihood={},
+        expected={},
+        replicated={},
+    )
+    return replace(fit, sampled=moved)
+
+
+@cached_per_fit
 def error_budget(fit: Record) -> ErrorBudget | None:
     """Return the error budget of a fit; None without draws, or where no error of the bench is left to add.
 
     Args:
         fit: The fit.
     """
-    uncertainties = list(_standard_errors(fit))
-    quantities = list_answers(fit) if fit.sampled is not None else {}
-    if not quantities or not uncertainties:
+    learned = learned_errors(fit)
+    quantities = list_answers(fit) if learned is not None else {}
+    if learned is None or not quantities:
         return None
-    chosen = np.linspace(0, len(fit.draws().flat_z) - 1, _DRAWS).astype(int)
-    scores = _scores(fit, fit.draws().flat_z[chosen], [step for _, steps in uncertainties for step in steps])
-    scores = {step: _without_far_scores(of_step) for step, of_step in scores.items()}
+    errors = learned.draw(len(fit.draws().flat_z), fit.provenance.seed)
+    deviations, with_errors = errors - errors.mean(axis=0), list_answers(with_bench_errors(fit))
     rows = []
     for name, (unit, draws) in quantities.items():
-        deviation = draws[chosen] - draws[chosen].mean()
+        moved = with_errors[name][1]
+        slopes = np.linalg.lstsq(deviations, moved - draws, rcond=None)[0]
         shifts = {
-            source.name: max(abs(float(np.mean(deviation * scores[step]))) * size for step, size in steps.items())
-            for source, steps in uncertainties
+            source.name: float(np.std(deviations[:, learned.source == number] @ slopes[learned.source == number]))
+            for number, source in enumerate(learned.sources)
         }
-        readings = Interval.of(draws)
-        bench = _widened(readings, list(shifts.values()), answer_limits(fit, name, readings))
-        rows.append(BudgetRow(name, unit, readings, bench, shifts))
-    return ErrorBudget(tuple(source for source, _ in uncertainties), tuple(rows))
+        rows.append(BudgetRow(name, unit, Interval.of(draws), Interval.of(moved), shifts))
+    return ErrorBudget(learned.sources, tuple(rows), _list_learned(learned))
 
 
-def _standard_errors(fit: Record) -> Iterator[tuple[ErrorSource, dict[BenchError, float]]]:
-    """Yield each source of error with the small steps that stand for it, and its standard uncertainty in such steps.
-
-    Between limits of +-a every value is as likely (GUM 4.3.7), which makes a standard uncertainty of a/sqrt(3); two load cells
-    have errors of their own. Of an error in proportion and one in degrees, the one that matters more to an answer counts.
-    """
-    stated, sensors = fit.dataset.description.errors, fit.dataset.description.sensors
-    angles = {
-        f"{stated.angle.value:g} {stated.angle.unit}": (BenchError(angle_offset=_STEP), stated.angle.to("angle")),
-        f"{100 * stated.angle_scale:g} %": (BenchError(angle_scale=_STEP), stated.angle_scale),
-    }
-    limits = {words: (step, limit) for words, (step, limit) in angles.items() if limit}
-    if limits:
-        steps = {step: limit / sqrt(3) / _STEP for step, limit in limits.values()}
-        yield ErrorSource("wrap angles", f"wrap angles known to {' or '.join(limits)}"), steps
-    of_both_cells = sqrt(2 / 3) / _STEP
-    if stated.gain and sensors.gain_sd is None:
-        words = f"a gain of each load cell known to {100 * stated.gain:g} %"
-        yield ErrorSource("gain", words), {BenchError(gain=_STEP): stated.gain * of_both_cells}
-    if stated.hysteresis:
-        words = f"a hysteresis of each load cell of up to {100 * stated.hysteresis:g} %"
-        yield ErrorSource("hysteresis", words), {BenchError(hysteresis=_STEP): stated.hysteresis * of_both_cells}
+def _list_learned(learned: LearnedErrors) -> tuple[LearnedError, ...]:
+    """Return each error of the bench with what readings reveal of it."""
+    sds, rows = np.sqrt(np.diag(learned.covariance)), []
+    steps = [(step, size) for source in learned.sources for step, size in source.steps.items()]
+    for (step, size), mean, sd in zip(steps, learned.mean, sds, strict=True):
+        (field,) = (name for name, value in vars(step).items() if value)
+        words, unit, scale = _SHOWN_ERRORS[field]
+        one_sd = size * STEP * scale
+        rows.append(LearnedError(words, unit, -float(mean) * one_sd, float(sd) * one_sd, one_sd))
+    return tuple(rows)
 
 
 def list_answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
@@ -194,81 +246,8 @@ def list_answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
     return quantities
 
 
-def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> dict[BenchError, np.ndarray]:
-    """Return the change of the log likelihood of each draw by each small error of the data."""
-    with jax.enable_x64(True):
-        posterior = LogDensity(fit.model)
-        data = _data_with(fit, BenchError())
-
-        def log_likelihood(z: Float[Array, " free"], data: Any) -> Array:
-            return sum((jnp.sum(part) for part in posterior.log_likelihoods(z, data).values()), jnp.zeros(()))
-
-        rows = jax.ShapeDtypeStruct((BATCH, z.shape[1]), float)
-        program = compile_program(jax.vmap(log_likelihood, in_axes=(0, None)), rows, data, run_often=fit.model.is_slow)
-        changes = {}
-        before = run_in_batches(lambda part: program(part, data), BATCH, z)
-        for error in errors:
-            changed = _data_with(fit, error)
-            after = run_in_batches(lambda part, changed=changed: program(part, changed), BATCH, z)
-            changes[error] = np.where(np.isfinite(after - before), after - before, 0.0)
-    return changes
-
-
-def _without_far_scores(scores: np.ndarray) -> np.ndarray:
-    """Scores cut off far from their median.
-
-    Where few readings allow nearly no scatter, the few draws with the least have scores in proportion to one over it. They
-    cancel in a covariance over infinitely many draws, but not over some thousand.
-    """
-    middle = np.median(scores)
-    reach = _FARTHEST_SCORE * np.median(np.abs(scores - middle))
-    return np.clip(scores, middle - reach, middle + reach)
-
-
-def _data_with(fit: Record, error: BenchError) -> tuple[Any, ...]:
-    """Return the data of all terms as a bench with a systematic error would have given them."""
-    measurements, cable = fit.dataset.measurements, fit.model.cable
-    tables = {kind.name: kind.with_bench_error(table, error) for kind, table in iterate_tables(measurements)}
-    angles = Measurements(tuple(tables.values())).table(AngleTable)
-    terms = [term for name, table in tables.items() for term in TERMS[name].terms(cable, table, angles)]
-    return tuple(_with_constant_angles(term.data, cable, error) for term in terms)
-
-
-def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) -> Any:
-    """Return data of a term whose rows also hold the constant wrap angles of cable.toml, those without a stated error."""
-    if isinstance(data, RunsData):
-        return replace(data, cells=_with_constant_angles(data.cells, cable, error))
-    angles = find_row_angles(data)
-    if angles is None:
-        return data
-    own_angles, is_own = np.array(angles.own, dtype=float), np.array(angles.is_own)
-    for k, contact in enumerate(cable.description.contact):
-        constant = contact.wrap_angle.constant
-        if constant is not None and constant.sd is None:
-            own_angles[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
-            is_own[..., k] = True
-    return replace(data, angles=replace(angles, own=own_angles, is_own=is_own))
-
-
-def answer_limits(fit: Record, name: str, readings: Interval) -> tuple[float, float]:
-    """Return the limits of a quantity: the range of a route, 0 and 1 of an efficiency, 0 of what is never negative."""
-    route = fit.dataset.description.route
-    if name == OPTIMAL_LENGTH and route is not None:
-        return route.range
-    return 0.0 if readings.q05 >= 0 else -np.inf, 1.0 if name == OPTIMAL_EFFICIENCY else np.inf
-
-
-def _widened(readings: Interval, shifts: list[float], limits: tuple[float, float]) -> Interval:
-    """Return an interval with further independent uncertainties, cut off at the limits of its quantity."""
-    added = sqrt(sum(shift**2 for shift in shifts))
-    low = readings.median - np.hypot(readings.median - readings.q05, NORMAL_90 * added)
-    high = readings.median + np.hypot(readings.q95 - readings.median, NORMAL_90 * added)
-    q05, q95 = max(float(low), limits[0]), min(float(high), limits[1])
-    return replace(readings, sd=float(np.hypot(readings.sd, added)), q05=q05, q95=q95)
-
-
-HEADS = ("quantity", "readings alone", "with errors", "angles", "gain", "hysteresis")
-_SOURCES = ("wrap angles", "gain", "hysteresis")
+HEADS = ("quantity", "readings alone", "with errors", "k", "angles", "gain", "hysteresis", "wear", "load")
+_SOURCES = ("wrap angles", "gain", "hysteresis", "wear", "load exponent")
 
 
 def budget_rows(budget: ErrorBudget) -> list[tuple[str, ...]]:
@@ -278,7 +257,8 @@ def budget_rows(budget: ErrorBudget) -> list[tuple[str, ...]]:
         digits = row.readings.digits
         name = row.quantity if row.unit in ("", "1") else f"{row.quantity} ({row.unit})"
         shifts = [f"{row.shifts[source]:.1g}" if source in row.shifts else "-" for source in _SOURCES]
-        rows.append((name, row.readings.range_text(digits), row.bench.range_text(digits), *shifts))
+        intervals = row.readings.range_text(digits), row.bench.range_text(digits)
+        rows.append((name, *intervals, f"{row.coverage_factor:.2f}", *shifts))
     return rows
 
 
@@ -287,7 +267,10 @@ def budget_text(fit: Record) -> str:
     budget = error_budget(fit)
     if budget is None:
         return ""
-    note = "The last three columns are the shifts by one standard deviation of each error; combined as the GUM does."
+    note = (
+        "k is the coverage factor; the last five columns are the shifts by one standard uncertainty of each error, as far as "
+        "readings leave it open. Propagated by Monte Carlo (JCGM 101)."
+    )
     lines = [TITLE, table(HEADS, budget_rows(budget)), *(filled(sentence) for sentence in (*budget.sentences(), note))]
     return "\n".join(lines)
 
@@ -299,15 +282,13 @@ def budget_section(fit: Record) -> PageSection | None:
 
 
 def answer_interval(fit: Record, quantity: str) -> Interval:
-    """Return the interval of a parameter that people copy: with the errors of the bench where the budget has it.
+    """Return the interval of a parameter that people copy: with the errors of the bench.
 
     Args:
         fit: The fit, with draws.
         quantity: Name of a parameter.
     """
-    budget = error_budget(fit)
-    row = budget.row(quantity) if budget is not None else None
-    return row.bench if row is not None else fit.parameter(quantity)
+    return with_bench_errors(fit).parameter(quantity)
 
 
 def find_optimal_length(fit: Record) -> OptimalLength:
@@ -316,10 +297,14 @@ def find_optimal_length(fit: Record) -> OptimalLength:
     Raises:
         UsageError: The description has no route to vary, or there is no posterior.
     """
-    best, budget = Record.optimal_length(fit), error_budget(fit)
-    rows = {} if budget is None else {row.quantity: row.bench for row in budget.rows}
-    length, efficiency = rows.get(OPTIMAL_LENGTH, best.length), rows.get(OPTIMAL_EFFICIENCY, best.efficiency)
-    return replace(best, length=length, efficiency=efficiency)
+    return with_bench_errors(fit).optimal_length_of_draws()
+
+
+def errors_beyond_limits(fit: Record) -> list[str]:
+    """Return clauses on errors of the bench that readings reveal to be beyond their limits."""
+    budget = error_budget(fit)
+    beyond = [error for error in budget.learned if error.contradicts_limit] if budget is not None else []
+    return [f"{error}, beyond its limit under [errors]" for error in beyond]
 
 
 def widening_sentence(fit: Record) -> str:

@@ -135,11 +135,19 @@ class DrawPrograms:
         values: Named values in shown units.
         quantities: Program for the readings that z implies; see `compile_replicator`.
         along_route: See `compile_along_route`; None without a route.
+        optimum: Optimal length and efficiency of each; None without a route.
     """
 
     values: DrawFunction
     quantities: DrawFunction
     along_route: DrawFunction | None
+    optimum: DrawFunction | None
+
+    def find_optimum(self, z: np.ndarray) -> dict[str, np.ndarray]:
+        """Return optimal length and efficiency of many z, by name; empty without a route."""
+        if self.optimum is None:
+            return {}
+        return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), self.optimum(z), strict=True))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -242,8 +250,8 @@ class Record(Display):
             raise UsageError(f"lengths = {shown(stated)} must be numbers in the unit of the route, such as [455, 470].")
         return at
 
-    def optimal_length(self) -> OptimalLength:
-        """Return the best length, how certain it is by the readings alone, and what the choices cost.
+    def optimal_length_of_draws(self) -> OptimalLength:
+        """Return the best length, how certain it is by these draws, and what the choices cost.
 
         Raises:
             UsageError: The description has no route to vary, or there is no posterior.

@@ -28,7 +28,7 @@ from bowdenfit.inference.sampler_agreement import SAMPLER_NAMES, SamplerDraws, c
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import compile_along_route, make_optimizer
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance
+from bowdenfit.results.record import DrawPrograms, Draws, Provenance
 from bowdenfit.results.serialization import coarsen_predictions, round_draws
 from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 from bowdenfit.stages import announce_stage
@@ -173,19 +173,15 @@ class Programs:
 
     Args:
         samplers: Compiled program of each sampler, by its name.
-        optimum: Optimal length and efficiency of many z; None without a route.
         draw_programs: Programs that questions will need.
     """
 
     samplers: dict[str, Any]
-    optimum: Callable[[np.ndarray], Any] | None
     draw_programs: DrawPrograms
 
     def quantities(self, z: np.ndarray) -> Mapping[str, np.ndarray]:
         """Return quantities that must converge besides the parameters, by name, for many z."""
-        if self.optimum is None:
-            return {}
-        return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), self.optimum(z), strict=True))
+        return self.draw_programs.find_optimum(z)
 
 
 def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Programs:
@@ -201,7 +197,7 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
     optimum = for_each_draw(make_optimizer(model), model.space.size, beside=beside) if model.description.route else None
     implied = compile_replicator(density, seed, beside)
     along_route = compile_along_route(model, beside) if model.description.route is not None else None
-    return Programs(programs, optimum, DrawPrograms(lambda z: implied(z)["values"], implied, along_route))
+    return Programs(programs, DrawPrograms(lambda z: implied(z)["values"], implied, along_route, optimum))
 
 
 def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:

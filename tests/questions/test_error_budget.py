@@ -50,17 +50,19 @@ def test_a_slope_is_the_shift_of_a_fit_with_that_error(fit, tmp_path, error, lim
     assert row.shifts[source] * np.sqrt(3) / cells == pytest.approx(moved, abs=0.15 * row.readings.sd), limit
 
 
-def test_uncertainties_are_combined_as_the_gum_does(fit):
+def test_uncertainties_add_as_in_the_gum(fit):
+    """Sources are not independent once readings reveal something of their sum, which is little here."""
     row = budget_of(fit).row("mu")
     added = np.sqrt(sum(shift**2 for shift in row.shifts.values()))
-    assert row.bench.sd == pytest.approx(np.hypot(row.readings.sd, added))
+    assert row.bench.sd == pytest.approx(np.hypot(row.readings.sd, added), rel=0.1)
+    assert row.coverage_factor == pytest.approx(1.6, abs=0.15)
     assert row.bench.q05 < row.readings.q05 < row.readings.median < row.readings.q95 < row.bench.q95
 
 
 def test_a_constant_angle_has_its_error_too(tmp_path):
     fit = bf.fit(bench(tmp_path / "table.csv", angles=False), seed=1, wrap_angle="180deg")
     row = budget_of(fit).row("mu")
-    assert row.shifts["wrap angles"] == pytest.approx(row.readings.median * 0.03 / np.sqrt(3), rel=0.1)
+    assert row.shifts["wrap angles"] == pytest.approx(row.readings.median * np.hypot(0.03, 3 / 180) / np.sqrt(3), rel=0.1)
 
 
 def test_the_first_page_of_a_precise_bench_has_the_interval_with_bench_errors_and_says_so(tmp_path):
@@ -68,7 +70,7 @@ def test_the_first_page_of_a_precise_bench_has_the_interval_with_bench_errors_an
     page, row = " ".join(str(fit).split()), budget_of(fit).row("mu")
     assert row.is_notable
     assert f"coefficient of friction {row.bench}." in page
-    assert "These intervals include bench errors, mainly wrap angles known to 3 deg or 3 % ([errors] in cable.toml);" in page
+    assert "These intervals include bench errors, mainly wrap angles known to 3 deg and 3 % ([errors] in cable.toml);" in page
     assert f"readings alone say {row.readings.range_text(row.readings.digits)} for mu." in page
     assert fit.summary()["error_budget"]["rows"][0]["bench"]["q05"] < fit.parameter("mu").q05
 
@@ -94,13 +96,15 @@ def test_the_best_length_includes_them_and_stays_within_its_range(quick_fit):
     description = quick_fit.dataset.description
     wrong = description.model_copy(update={"errors": BenchErrors(angle_scale=50, gain=9)})
     wide = replace(quick_fit, dataset=replace(quick_fit.dataset, description=wrong)).optimal_length()
-    assert (wide.length.q05, wide.length.q95) == description.route.range
-    assert wide.efficiency.q95 == 1
+    low, high = description.route.range
+    assert low <= wide.length.q05 < best.length.q05 and best.length.q95 < wide.length.q95 <= high
+    assert wide.efficiency.q95 <= 1
 
 
 def test_stated_errors_replace_the_usual_ones_or_leave_the_budget(tmp_path):
     path = bench(tmp_path / "table.csv", noise=5e-4)
     settings = ["errors.angle_scale=0", "errors.angle={value=0,unit='deg'}", "errors.hysteresis=0.001"]
+    settings += ["errors.wear=0", "errors.load_exponent=0"]
     settings += ["sensors.input_gain_error_sd=0.001", "sensors.output_gain_error_sd=0.001"]
     row = budget_of(bf.fit(path, seed=1, settings=settings)).row("mu")
     assert set(row.shifts) == {"hysteresis"}

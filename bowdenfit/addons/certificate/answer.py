@@ -22,13 +22,11 @@ from bowdenfit.addons.certificate.uncertainty import (
     coverage_factor,
     effective_degrees_of_freedom,
     fit_t_distribution,
-    propagate,
     symmetric_interval,
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import BowdenfitError, UsageError, suggest_name
-from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.error_budget import answer_limits, error_budget, list_answers
+from bowdenfit.questions.error_budget import error_budget, list_answers, with_bench_errors
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 from bowdenfit.types import Vector
@@ -147,6 +145,8 @@ class Certificate(Display):
         ]
         return rows, {}
 
+_SMALL = 0.2  # share of the combined uncertainty below which components share a line; a judgement
+
 
 def certify(fit: Record, laboratory_file: str | Path, probability: float = 0.95) -> Certificate:
     """Return the certificate of a fit.
@@ -177,9 +177,7 @@ def certify(fit: Record, laboratory_file: str | Path, probability: float = 0.95)
     propagated = {name: _propagate_answer(fit, name, values) for name, (_, values) in answers.items()}
     meanings = {p.name: p.meaning for p in fit.model.space.free} | MEANINGS
     quantities = tuple(
-        _certify_quantity(
-            name, meanings[name], unit, propagated[name], probability, answer_limits(fit, name, Interval.of(values))
-        )
+        _certify_quantity(name, meanings[name], unit, propagated[name], probability, _answer_limits(fit, name, values))
         for name, (unit, values) in answers.items()
     )
     statements = tuple(_judge(limit, quantities, propagated) for limit in laboratory.limit)
@@ -201,8 +199,21 @@ def _propagate_answer(fit: Record, name: str, values: Vector) -> tuple[Vector, t
     row, words = (None, {}) if budget is None else (budget.row(name), {s.name: s.words for s in budget.sources})
     shifts = {} if row is None else row.shifts
     readings = UncertaintyComponent("readings (posterior)", "A", *fit_t_distribution(values))
-    bench = (UncertaintyComponent(words[source], "B", shift, np.inf) for source, shift in shifts.items())
-    return propagate(values, shifts, fit.provenance.seed), (readings, *bench)
+    of_bench = {words[source]: shift for source, shift in shifts.items()}
+    small = {source: shift for source, shift in of_bench.items() if shift < _SMALL * row.bench.sd} if row is not None else {}
+    if len(small) > 1:
+        of_bench = {source: shift for source, shift in of_bench.items() if source not in small}
+        of_bench["other errors of the bench"] = float(np.hypot.reduce(list(small.values())))
+    bench = (UncertaintyComponent(source, "B", shift, np.inf) for source, shift in of_bench.items())
+    return list_answers(with_bench_errors(fit))[name][1], (readings, *bench)
+
+
+def _answer_limits(fit: Record, name: str, values: Vector) -> tuple[float, float]:
+    """Return the limits of a quantity: the range of a route, 0 and 1 of an efficiency, 0 of what is never negative."""
+    route = fit.dataset.description.route
+    if name == OPTIMAL_LENGTH and route is not None:
+        return route.range
+    return 0.0 if np.min(values) >= 0 else -np.inf, 1.0 if name == OPTIMAL_EFFICIENCY else np.inf
 
 
 def _certify_quantity(

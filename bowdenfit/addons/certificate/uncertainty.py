@@ -6,7 +6,7 @@ References:
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,10 +16,6 @@ from scipy.stats import t as student
 
 from bowdenfit.types import Vector
 
-TWO_CELLS = (
-    "gain",
-    "hysteresis",
-)  # sources of the error budget that are errors of two load cells, independent of each other
 # Degrees of freedom from which on the shape of some thousand draws does not differ from a normal one by more than it scatters
 # (the ratio of widths below by 2 %). A judgement.
 LARGEST_DEGREES = 50.0
@@ -89,23 +85,6 @@ def fit_t_distribution(draws: Vector) -> tuple[float, float]:
 def _width_ratio(degrees: float) -> float:
     """Return the width of the central 95 % interval of a t distribution over that of its central 50 % interval."""
     return float(student.ppf(0.975, degrees) / student.ppf(0.75, degrees))
-
-
-def propagate(draws: Vector, shifts: Mapping[str, float], seed: int) -> Vector:
-    """Return draws of a quantity with the errors of the bench added (JCGM 101, 7).
-
-    Between its limits every error is as likely (JCGM 101, 6.4.2), and two load cells have errors of their own (6.4.4).
-
-    Args:
-        draws: Draws by the readings alone.
-        shifts: Standard uncertainty of each source in the unit of the quantity, by name.
-        seed: Random seed.
-    """
-    generator, total = np.random.default_rng(seed), np.array(draws, dtype=float)
-    for name, shift in shifts.items():
-        errors = generator.uniform(-1, 1, (2 if name in TWO_CELLS else 1, len(total)))
-        total += shift * math.sqrt(3 / len(errors)) * errors.sum(axis=0)
-    return total
 
 
 def symmetric_interval(draws: Vector, probability: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.bench_error import BenchError, order_of
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.misread_angles import describe_misread_angles
 from bowdenfit.kinds.forces.mountings import ForceSettings
@@ -209,7 +209,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     @override
     def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:
         """Return the table with the error in its output forces and wrap angles."""
-        force = error.apply_to_force(table.output_force, table.stroke)
+        order = order_of(table.run, len(table.run_names))
+        worn = error.apply_to_friction(table.input_force, table.output_force, order)
+        force = error.apply_to_force(np.where(table.stroke != 0, worn, table.output_force), table.stroke)
         return replace(table, output_force=force, own=error.apply_to_rows(table.own))
 
     @override

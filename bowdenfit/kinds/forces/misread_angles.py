@@ -94,7 +94,7 @@ def _group_rows(table: ForceTable) -> list[_Group]:
             for label in np.unique(labels[rows])
             for run in np.unique(table.run[rows])
         ]
-        limits = [_split_loss(log_ratio[part], table.input_force[part]) for part in of_runs]
+        limits = [_split_loss(log_ratio[part], table.input_force[part], table.stroke[part]) for part in of_runs]
         limit = max((limit for limit in limits if limit is not None), default=None)
         parts = [rows] if limit is None else [rows[log_ratio[rows] < limit], rows[log_ratio[rows] >= limit]]
         groups += [
@@ -103,14 +103,19 @@ def _group_rows(table: ForceTable) -> list[_Group]:
     return groups
 
 
-def _split_loss(loss: Vector, load: Vector) -> float | None:
-    """Friction exponent between two parts of a run that differ by `_FACTOR` at equal loads; None if they do not."""
+def _split_loss(loss: Vector, load: Vector, stroke: Labels) -> float | None:
+    """Friction exponent between two parts of a run that differ by `_FACTOR` at equal loads; None if they do not.
+
+    Two parts that are the two strokes differ by the gain of the load cells, not by an angle.
+    """
     order = np.argsort(loss)
     gaps = np.diff(loss[order])[_FEWEST - 1 : len(loss) - _FEWEST]
     if len(gaps) == 0:
         return None
     cut = int(np.argmax(gaps)) + _FEWEST
     low, high = order[:cut], order[cut:]
+    if len(np.unique(stroke[low])) == len(np.unique(stroke[high])) == 1 and stroke[low[0]] != stroke[high[0]]:
+        return None
     squares = sum(float(np.sum((loss[part] - loss[part].mean()) ** 2)) for part in (low, high))
     scatter = np.sqrt(squares / max(len(loss) - 2, 1))
     if loss[order[0]] <= 0 or loss[high].min() < _FACTOR * loss[low].max() or np.max(gaps) < _CLEAR * scatter:

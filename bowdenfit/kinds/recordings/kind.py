@@ -10,7 +10,7 @@ from bowdenfit.description import Description, Preparation, QuantityValue
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.headings import Quantity
-from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.bench_error import BenchError, order_of
 from bowdenfit.kinds.kind import FrictionKind, Readings, efficiency_readings
 from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, explain_impossible_loss
 from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings, read_recordings
@@ -308,9 +308,12 @@ class RecordingKind(FrictionKind[Recordings]):
     @override
     def with_bench_error(self, table: Recordings, error: BenchError) -> Recordings:
         """Return the recordings with the error in their output forces and wrap angles; their strokes stay."""
-        items = []
-        for recording in table.items:
-            force = error.apply_to_force(recording.blocks.output_force, recording.strokes.contact)
+        items, order = [], order_of(np.array([table.runs.index(recording.run) for recording in table.items]), len(table.runs))
+        for recording, late in zip(table.items, order, strict=True):
+            force = recording.blocks.output_force
+            if not table.loop:
+                force = error.apply_to_friction(recording.blocks.input_force, force, late)
+            force = error.apply_to_force(force, recording.strokes.contact)
             angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
             items.append(replace(recording, own_angle=angle, blocks=replace(recording.blocks, output_force=force, finer=None)))
         return replace(table, items=tuple(items))

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate
+from bowdenfit.questions.error_budget import find_optimal_length
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 EQUAL_WITHIN = 2.0  # standard errors within which two candidates are as good as each other: 95 % of chance
@@ -64,7 +65,7 @@ def choose_target(fit: Record, name: str | None) -> TargetQuantity:
     if kind == "efficiency":
         return _make_efficiency_target(fit, name, place)
     if name in ("optimal-length", "optimal-efficiency"):
-        best = fit.optimal_length()  # refuses cables without a route
+        best = find_optimal_length(fit)  # refuses cables without a route
         variable = best.variable.replace("_", " ")
         if name == "optimal-length":
             return TargetQuantity(name, f"the best {variable}", best.unit, draws.optimum[OPTIMAL_LENGTH].ravel())

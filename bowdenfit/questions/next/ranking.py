@@ -12,6 +12,7 @@ from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.forces.next_run import typical_run
 from bowdenfit.kinds.terms import candidate_kinds
+from bowdenfit.questions.error_budget import find_optimal_length
 from bowdenfit.questions.next.answer import (
     EQUAL_WITHIN,
     LEAST_SHARE,
@@ -122,7 +123,7 @@ def _load_range(fit: Record) -> tuple[float, float] | None:
 
 def is_good_enough(fit: Record, target: TargetQuantity) -> bool:
     """Return whether nothing needs to be measured, which can be said of the best length alone."""
-    return _is_optimum(target) and fit.optimal_length().is_certain
+    return _is_optimum(target) and find_optimal_length(fit).is_certain
 
 
 def _is_optimum(target: TargetQuantity) -> bool:
@@ -132,7 +133,7 @@ def _is_optimum(target: TargetQuantity) -> bool:
 def stopping_advice(fit: Record, target: TargetQuantity) -> str:
     """Say whether more needs to be measured at all."""
     if _is_optimum(target):
-        best = fit.optimal_length()
+        best = find_optimal_length(fit)
         return (
             f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}"
             if best.is_certain

@@ -8,7 +8,7 @@ from bowdenfit.kinds import iterate_tables
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.error_budget import widening_sentence
+from bowdenfit.questions.error_budget import find_optimal_length, widening_sentence
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.next.words import TITLE
 from bowdenfit.questions.summary.brief import (
@@ -43,7 +43,7 @@ def answer_section(fit: Record) -> PageSection:
     fit_verdict, (first, *others) = assess_fit(fit), summary_sentences(fit)
     choices: tuple[PageTable, ...] = ()
     if fit.sampled is not None and fit.dataset.description.route is not None:
-        best = fit.optimal_length()
+        best = find_optimal_length(fit)
         choices = (PageTable(best.heads, tuple(best.rows), "Lengths that can be bought"),) if best.choices else ()
     context = {
         "trusted": fit_verdict.trusted,

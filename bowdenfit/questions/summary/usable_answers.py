@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.inference.psis import reliable_k, smooth_weights
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.identify.judgment import find_unidentified
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, Record, cached_per_fit
 
@@ -47,7 +48,8 @@ def find_usable_answers(fit: Record) -> UsableAnswers:
     undetermined = tuple(find_unidentified(fit).names)
     if fit.sampled is None or fit.dataset.description.route is None:
         return UsableAnswers(None, None, undetermined)
-    best = fit.optimal_length()
+    fit = with_bench_errors(fit)
+    best = fit.optimal_length_of_draws()
     if not undetermined:
         return UsableAnswers(best.is_certain, True, ())
     if not best.is_certain:

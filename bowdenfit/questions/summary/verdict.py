@@ -24,6 +24,7 @@ from bowdenfit.questions.check.implausible_readings import (
 from bowdenfit.questions.check.lack_of_fit import describe_lack_of_fit
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import describe_assumed_widths, describe_misfits
+from bowdenfit.questions.error_budget import errors_beyond_limits, find_optimal_length
 from bowdenfit.questions.identify.judgment import (
     assess_identifiability,
     confounded_pairs,
@@ -183,7 +184,10 @@ def assess_fit(fit: Record) -> Verdict:
 
 def _describe_misfits(fit: Record) -> tuple[str, ...]:
     """Describe what the model leaves out: faults of the bench, a wrong delay, and lack of fit."""
-    return describe_bench_faults(fit.dataset) + _sentences(describe_wrong_delay(fit)) + describe_lack_of_fit(fit)
+    lack = describe_lack_of_fit(fit)
+    if lack and (beyond := errors_beyond_limits(fit)):
+        lack += (f"The readings reveal that {listed(beyond)}; correct the readings, or state a limit that the bench keeps.",)
+    return describe_bench_faults(fit.dataset) + _sentences(describe_wrong_delay(fit)) + lack
 
 
 def assess_for(fit: Record, purpose: Purpose) -> Verdict:
@@ -193,13 +197,13 @@ def assess_for(fit: Record, purpose: Purpose) -> Verdict:
 
 def _describe_doubts(fit: Record) -> tuple[str, ...]:
     """Describe readings that lie far off, and tables that scatter otherwise than predicted."""
-    checks = check_readings(fit)
+    checks, of_bench = check_readings(fit), errors_beyond_limits(fit)
     if checks is None:
-        return ()
+        return tuple(of_bench)
     outliers = [describe_reading(reading.table, reading.label) for reading in checks.outliers]
     lie = "lies" if len(outliers) == 1 else "lie"
     sentences = [f"{few(outliers)} {lie} far from what the other readings predict"] if outliers else []
-    return (*sentences, *describe_misfits(checks))
+    return (*sentences, *describe_misfits(checks), *of_bench)
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:
@@ -276,7 +280,7 @@ def suggest_next_step(fit: Record) -> str:
     influential = few(map(_name_reading, checks.influential), most=2)  # how far on each differs from one seed to the next
     noun = "reading" if len(checks.influential) == 1 else "readings"
     remeasure = f"; if in doubt, first repeat the most influential {noun}: {influential}" if influential else ""
-    if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
+    if fit.dataset.description.route is not None and find_optimal_length(fit).is_certain:
         return f"Next: no further measurement is needed{remeasure}. bowdenfit next ranks further measurements."
     if not has_candidates(fit):
         return f"Next: a measurement of another kind, or at other bends, would add more{remeasure}."

@@ -29,7 +29,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import make_optimizer_of_values, route_grid
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance, Record
+from bowdenfit.results.record import DrawPrograms, Draws, Provenance, Record
 
 SETTINGS = BatchSettings(  # standard deviations to a twentieth, as 400 effective draws give them
     SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=20_000, target_ess=400, target_r_hat=1.03),
@@ -89,10 +89,8 @@ class GrowingFit:
             if not len(fit.z):
                 raise ConvergenceError(fit.reasons[0])
             order = np.random.default_rng([self.seed, _SHUFFLE]).permutation(len(fit.z) // _CHAINS * _CHAINS)
-            z, draw_programs, optimum = fit.z[order], _bind(programs, data), {}
-            if (find_optimum := programs.optimum) is not None:
-                at = run_in_batches(lambda rows: find_optimum(rows, data), BATCH, z)
-                optimum = {name: _chains(part) for name, part in zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), at, strict=True)}
+            z, draw_programs = fit.z[order], _bind(programs, data)
+            optimum = {name: _chains(part) for name, part in draw_programs.find_optimum(z).items()}
             values = {name: _chains(part) for name, part in draw_programs.values(z).items()}
         draws = Draws(_chains(z), values, optimum, {}, {}, {}, {}, {}, _CHAINS, fit.steps, np.nan)
         provenance = Provenance(self.seed, dict(installed_versions()), {}, datetime.now(UTC).isoformat(timespec="seconds"))
@@ -149,7 +147,14 @@ def _bind(programs: ShapePrograms, data: Any) -> DrawPrograms:
         program = programs.along_route
         return run_in_batches(lambda rows: program(rows, data), BATCH, z_and_mounting[:, :-1])
 
-    return DrawPrograms(values, lambda z: {"values": values(z)}, along_route if programs.along_route else None)
+    def optimum(z: np.ndarray) -> Any:
+        assert programs.optimum is not None  # there is a route
+        program = programs.optimum
+        return run_in_batches(lambda rows: program(rows, data), BATCH, z)
+
+    has_route = programs.along_route is not None
+    of_values = lambda z: {"values": values(z)}  # noqa: E731
+    return DrawPrograms(values, of_values, along_route if has_route else None, optimum if has_route else None)
 
 
 def _compile_shape(posterior: ScaledDensity, model: Model) -> ShapePrograms:

@@ -63,12 +63,12 @@ def test_uncertainties_are_those_of_the_draws_with_the_errors_of_the_bench(quick
     assert [q.name for q in certificate.quantities] == [row.quantity for row in budget.rows]
     for quantity in certificate.quantities:
         row, n = budget.row(quantity.name), len(quick_fit.posterior.flat_z)
+        assert (quantity.value, quantity.standard) == pytest.approx((row.bench.mean, row.bench.sd))
         expected = math.sqrt(row.readings.sd**2 + sum(shift**2 for shift in row.shifts.values()))
-        assert quantity.standard == pytest.approx(expected, rel=5 / math.sqrt(2 * n) + 0.02)
-        assert abs(quantity.value - row.readings.mean) < 5 * quantity.standard / math.sqrt(n)
+        assert quantity.standard == pytest.approx(expected, rel=5 / math.sqrt(2 * n) + 0.05)
         assert quantity.factor * quantity.standard == pytest.approx((quantity.interval[1] - quantity.interval[0]) / 2)
-        shifts = {c.name: c.standard for c in quantity.budget if c.evaluation == "B"}
-        assert shifts == {source.words: row.shifts[source.name] for source in budget.sources}
+        standard = [c.standard for c in quantity.budget if c.evaluation == "B"]
+        assert math.hypot(*standard) == pytest.approx(math.hypot(*row.shifts.values()))
 
 
 def test_a_wider_coverage_probability_widens_the_interval_alone(quick_fit, certificate):
@@ -82,15 +82,15 @@ def test_limits_are_judged_by_the_draws(quick_fit, certificate, write):
     judged = {s.quantity: s for s in certificate.statements}
     mu1 = certificate.quantity("mu1")
     assert judged["mu1"].guard_band == mu1.expanded
-    assert judged["mu1"].acceptance.upper == pytest.approx(0.12 - mu1.expanded)
+    assert judged["mu1"].acceptance.upper == pytest.approx(0.13 - mu1.expanded)
     assert judged["mu1"].probability + judged["mu1"].consumer_risk == pytest.approx(1)
     assert judged["mu1"].global_risks is None and judged["optimal_efficiency"].global_risks is not None
     near = f"at_most = {mu1.value + mu1.expanded / 2:.4f}"
-    (*_, conditional) = certify(quick_fit, write(("at_most = 0.12", near))).statements
+    (*_, conditional) = certify(quick_fit, write(("at_most = 0.13", near))).statements
     assert conditional.decision == "conditional pass"
-    (*_, simple) = certify(quick_fit, write(("at_most = 0.12", f"{near}\nguard_band = 0"))).statements
+    (*_, simple) = certify(quick_fit, write(("at_most = 0.13", f"{near}\nguard_band = 0"))).statements
     assert (simple.decision, simple.guard_band) == ("pass", 0)
-    (*_, failing) = certify(quick_fit, write(("at_most = 0.12", f"at_most = {mu1.value / 4:.4f}"))).statements
+    (*_, failing) = certify(quick_fit, write(("at_most = 0.13", f"at_most = {mu1.value / 4:.4f}"))).statements
     assert failing.decision == "fail"
     assert failing.producer_risk < 0.05 < judged["mu1"].producer_risk
 
@@ -245,9 +245,9 @@ def test_without_certificates_of_cells_the_page_says_that_nothing_is_traceable(q
 WRONG = {
     "a limit of nothing": (('quantity = "mu1"', 'quantity = "mu9"'), "a [[limit]] of laboratory.toml is for 'mu9', which this"),
     "a limit twice": (('quantity = "mu1"', 'quantity = "optimal_efficiency"'), "optimal_efficiency has two [[limit]] entries"),
-    "no limit": (("at_most = 0.12", ""), "write at_most, at_least or both"),
-    "limits exchanged": (("at_most = 0.12", "at_most = 0.12\nat_least = 0.2"), "at_least = 0.2 must be below at_most = 0.12"),
-    "a guard band too wide": (("at_most = 0.12", "at_most = 0.12\nat_least = 0.1"), "no value could be accepted"),
+    "no limit": (("at_most = 0.13", ""), "write at_most, at_least or both"),
+    "limits exchanged": (("at_most = 0.13", "at_most = 0.13\nat_least = 0.2"), "at_least = 0.2 must be below at_most = 0.13"),
+    "a guard band too wide": (("at_most = 0.13", "at_most = 0.13\nat_least = 0.1"), "no value could be accepted"),
     "a misspelled key": (("temperature_degC", "temprature_degC"), "temperature_degC"),
     "a range turned": (("[41, 48]", "[48, 41]"), "humidity_percent = [48.0, 41.0] must be the lowest value and the highest"),
     "dates turned": (("end = 2026-11-25", "end = 2026-11-20"), "before they begin on 2026-11-23"),

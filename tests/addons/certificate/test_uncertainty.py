@@ -13,8 +13,6 @@ from bowdenfit.addons.certificate.uncertainty import (
     coverage_factor,
     effective_degrees_of_freedom,
     fit_t_distribution,
-    propagate,
-    symmetric_interval,
 )
 
 # JCGM 100:2008, table H.1 [nm]: the standard, the difference, and the differences of expansion and of temperature.
@@ -42,30 +40,6 @@ def test_the_end_gauge_of_the_gum_comes_out_to_its_printed_digits():
     assert gauge.in_unit(gauge.value) == "50.000838 mm"
     assert gauge.in_unit(gauge.expanded) == "0.000093 mm"
     assert gauge.degrees == degrees
-
-
-def test_four_rectangular_inputs_have_the_interval_of_jcgm_101():
-    """JCGM 101:2008, 9.2.3.3: 2 sqrt(3) (2 - (3/5)^(1/4)) = 3.88; within 5 standard errors of a million draws."""
-    exact = 2 * math.sqrt(3) * (2 - 0.6**0.25)
-    assert f"{exact:.2f}" == "3.88"
-    draws = propagate(np.zeros(10**6), dict.fromkeys("abcd", 1.0), seed=3)
-    assert np.std(draws) == pytest.approx(2, abs=5 * math.sqrt(2) / 1000)
-    assert symmetric_interval(draws, 0.95) == pytest.approx((-exact, exact), abs=0.03)
-
-
-def test_errors_of_two_load_cells_are_triangular_together():
-    draws = propagate(np.full(10**6, 7.0), {"gain": 0.1}, seed=4)
-    assert np.std(draws) == pytest.approx(0.1, rel=0.005)
-    assert np.ptp(draws) == pytest.approx(2 * 0.1 * math.sqrt(6), rel=0.005)  # twice as wide as half of a triangle
-    assert stats.kurtosis(draws) == pytest.approx(-0.6, abs=0.02)
-
-
-def test_what_is_propagated_keeps_the_scatter_of_the_readings():
-    readings = stats.norm(3, 0.2).ppf(GRID)
-    draws = propagate(readings, {"wrap angles": 0.15, "gain": 0.0}, seed=5)
-    assert np.std(draws) == pytest.approx(0.25, rel=0.01)
-    assert np.array_equal(propagate(readings, {"wrap angles": 0.15, "gain": 0.0}, seed=5), draws)
-    assert np.array_equal(propagate(readings, {}, seed=5), readings)
 
 
 @pytest.mark.parametrize("degrees", [1.5, 3, 8, 25])

@@ -1,0 +1,175 @@
+r"""What readings reveal of the errors of a bench, and how far the rest may move each parameter.
+
+Errors e of the bench, in units of their standard uncertainties, are further parameters with independent priors of unit
+variance. About a point of the posterior, standardized residuals are linear in both, r(z, e) = r + J δ + K e, so that e is
+integrated out in closed form:
+
+.. math:: \operatorname{Cov}(e) = (1 + K^\top (1 - H) K)^{-1}, \quad
+          \operatorname{E}(e) = -\operatorname{Cov}(e) K^\top (1 - H) r, \quad H = J (1 + J^\top J)^{-1} J^\top
+
+and a draw of the posterior without them moves by :math:`-(1 + J^\top J)^{-1} J^\top K e`. An error that looks like friction, as
+wrap angles that are all too large, is not determined by any reading: its variance stays 1. One that shows, as a gain where both
+strokes were read, is estimated, and moves the answer.
+
+References:
+    JCGM 101:2008, Supplement 1 to the GUM: propagation of distributions using a Monte Carlo method.
+    Kennedy and O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63 (2001), 425.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import Problem, noise_scales
+from bowdenfit.inference.solver import ROUGH
+from bowdenfit.kinds.bench_error import ErrorSource, iterate_error_sources
+
+_FREE = 1e-6  # weight of a prior that does not count
+# Standard deviations of the estimate of an error within its limit, beyond which it contradicts that limit: so it is of one of
+# six errors in one healthy fit in a hundred.
+CONTRADICTION = 3.1
+
+
+@dataclass(frozen=True)
+class LearnedErrors:
+    """Posterior of the errors of a bench, in units of their standard uncertainties, in linear approximation.
+
+    Args:
+        sources: Causes of error; each has one column or more below.
+        source: Number of the source of each column.
+        mean: Posterior mean of each, (errors).
+        covariance: Posterior covariance, (errors, errors).
+        information: What the readings add to the unit prior information, (errors, errors).
+        moves: Change of each z with each error, (free, errors).
+        columns: Change of each residual with each error, (residuals, errors).
+        inside: Change of each reading inside runs from its cell, in units of its noise, (readings, errors), by table.
+    """
+
+    sources: tuple[ErrorSource, ...]
+    source: np.ndarray
+    mean: np.ndarray
+    covariance: np.ndarray
+    information: np.ndarray
+    moves: np.ndarray
+    columns: np.ndarray
+    inside: Mapping[str, np.ndarray]
+
+    def draw(self, count: int, seed: int) -> Float[np.ndarray, "draws errors"]:
+        """Draw errors from their posterior: from rectangular priors (GUM 4.3.7), corrected by what the readings say.
+
+        Args:
+            count: Number of draws.
+            seed: Random seed.
+        """
+        generator = np.random.default_rng([seed, 5])
+        prior = np.empty((count, len(self.mean)))
+        for k, number in enumerate(self.source):
+            cells = self.sources[number].cells
+            prior[:, k] = generator.uniform(-1, 1, (cells, count)).sum(axis=0) * np.sqrt(3 / cells)
+        values, vectors = np.linalg.eigh(self.information)
+        noise = generator.normal(size=prior.shape) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        return self.mean + (prior + noise) @ self.covariance
+
+
+def learn_errors(posterior: LogDensity, z: np.ndarray) -> LearnedErrors | None:
+    """Return what readings reveal of the errors of their bench; None where none is left to learn.
+
+    Args:
+        posterior: The posterior.
+        z: A point in its middle, at whose noise scales residuals are weighed.
+    """
+
+    def residuals(z: Array, data: Any) -> tuple[Array, Array]:
+        stacked = jnp.concatenate(list(posterior.residuals(z, data).values()))
+        return stacked, stacked
+
+    if not _has_errors(posterior):
+        return None
+    slow, shape = posterior.model.is_slow, jax.ShapeDtypeStruct(z.shape, float)
+    program = compile_program(
+        jax.jacfwd(residuals, has_aux=True), shape, posterior.data, run_once=not slow, run_often=slow
+    )
+    free = ~noise_scales(posterior)
+    return _learn(posterior, lambda data: program(z, data), posterior.values(jnp.asarray(z), posterior.data), free * 1.0, z)
+
+
+def learn_at_minimum(problem: Problem, z: np.ndarray, pinned: np.ndarray) -> LearnedErrors | None:
+    """Return what readings reveal of the errors of their bench about a minimum of least squares; None where none is left.
+
+    Args:
+        problem: The problem, whose data are those of its model.
+        z: The minimum, noise scales included.
+        pinned: Which parameters are pinned besides noise scales.
+    """
+    if not _has_errors(problem.posterior) or problem.posterior.data_override is not None:
+        return None
+
+    def evaluate(data: Any) -> tuple[np.ndarray, np.ndarray]:
+        solution = problem.objective(z, np.ones(len(z), dtype=bool), z, problem.weight, data, ROUGH)
+        return solution["sensitivity"], np.concatenate(list(solution["residuals"].values()))
+
+    counts = np.where(problem.noise | pinned, 0.0, np.maximum(problem.penalty, _FREE))
+    values = problem.posterior.model.space.constrain(jnp.asarray(z))
+    return _learn(problem.posterior, evaluate, values, counts, np.where(problem.penalty > 0, z, 0.0))
+
+
+def _has_errors(posterior: LogDensity) -> bool:
+    """Return whether there are errors of a bench and measurements that may have them."""
+    sources = iterate_error_sources(posterior.model.description)
+    return bool(posterior.model.measurements.tables) and any(True for _ in sources)
+
+
+def _learn(
+    posterior: LogDensity,
+    evaluate: Callable[[Any], tuple[Any, Any]],
+    values: Mapping[str, Any],
+    prior: np.ndarray,
+    z: np.ndarray,
+) -> LearnedErrors:
+    """Return the posterior of the errors.
+
+    Args:
+        posterior: The posterior.
+        evaluate: Returns the Jacobian and the residuals of data of all terms.
+        values: Parameters by name [internal units].
+        prior: Weight of the prior of each z; 0 for noise scales, which residuals do not determine.
+        z: Residuals of these priors.
+    """
+    sources = tuple(iterate_error_sources(posterior.model.description))
+    jacobian, residuals = (np.nan_to_num(np.asarray(part)) for part in evaluate(posterior.data))
+    jacobian = jacobian * (prior > 0)
+    inside = {term.name: _inside_runs(term, values) for term in posterior.model.terms}
+    columns, of_readings, numbers = list[np.ndarray](), list[dict[str, np.ndarray]](), list[int]()
+    for number, source in enumerate(sources):
+        for step, size in source.steps.items():
+            terms = posterior.model.terms_with_error(step)
+            changed = np.asarray(evaluate(tuple(term.data for term in terms))[1])
+            columns.append(np.nan_to_num((changed - residuals) * size, posinf=0.0, neginf=0.0))
+            of_readings.append({term.name: (_inside_runs(term, values) - inside[term.name]) * size for term in terms})
+            numbers.append(number)
+    errors = np.stack(columns, axis=1)
+    readings = {name: np.stack([of_error[name] for of_error in of_readings], axis=1) for name in inside}
+    moves = -np.linalg.solve(np.diag(np.where(prior > 0, prior**2, 1.0)) + jacobian.T @ jacobian, jacobian.T @ errors)
+    remaining = errors + jacobian @ moves
+    information, gradient = errors.T @ remaining, remaining.T @ residuals + moves.T @ (prior * z)
+    for name, single in readings.items():  # parameters do not follow readings inside cells
+        information, gradient = information + single.T @ single, gradient + single.T @ inside[name]
+    information = (information + information.T) / 2
+    covariance = np.linalg.inv(np.eye(len(numbers)) + information)
+    return LearnedErrors(sources, np.array(numbers), -covariance @ gradient, covariance, information, moves, errors, readings)
+
+
+def _inside_runs(term: Any, values: Mapping[str, Any]) -> np.ndarray:
+    """Return the standardized deviation of each reading inside runs from its cell; empty where there are none."""
+    inside = getattr(term, "inside", None)
+    if inside is None:
+        return np.zeros(0)
+    return np.asarray(np.sqrt(inside.weight) * inside.apart / float(values[term.reading_noise]))

@@ -1,0 +1,114 @@
+"""What readings reveal of bench errors: draws of what is left open, and benches whose fault shows or does not."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import bowdenfit as bf
+from bowdenfit.inference.bench_errors import LearnedErrors
+from bowdenfit.kinds.bench_error import BenchError, ErrorSource, order_of
+
+MU, LOADS = 0.15, (20.0, 40.0, 80.0, 120.0)
+
+
+def unlearned(cells, count=1):
+    """Errors of which readings say nothing."""
+    sources = tuple(ErrorSource(f"error {i}", "", {BenchError(gain=1.0): 1.0}, cells) for i in range(count))
+    nothing = np.zeros((count, count))
+    return LearnedErrors(sources, np.arange(count), np.zeros(count), np.eye(count), nothing, nothing, nothing, {})
+
+
+def test_four_rectangular_errors_have_the_interval_of_jcgm_101():
+    """JCGM 101:2008, 9.2.3.3: 2 sqrt(3) (2 - (3/5)^(1/4)) = 3.88; within 5 standard errors of a million draws."""
+    exact = 2 * math.sqrt(3) * (2 - 0.6**0.25)
+    assert f"{exact:.2f}" == "3.88"
+    total = unlearned(1, 4).draw(10**6, 3).sum(axis=1)
+    assert np.std(total) == pytest.approx(2, abs=5 * math.sqrt(2) / 1000)
+    assert np.quantile(total, (0.025, 0.975)) == pytest.approx((-exact, exact), abs=0.03)
+
+
+def test_errors_of_two_load_cells_are_triangular_together():
+    draws = unlearned(2).draw(10**6, 4)
+    assert np.std(draws) == pytest.approx(1.0, rel=0.005)
+    assert np.ptp(draws) == pytest.approx(2 * math.sqrt(6), rel=0.005)  # twice as wide as half of a triangle
+    assert stats.kurtosis(draws[:, 0]) == pytest.approx(-0.6, abs=0.02)
+
+
+def test_a_learned_error_has_the_posterior_of_normal_readings():
+    """A prior of unit variance and a reading of 3.0 ± 0.5 have mean 2.4 and variance 0.2."""
+    source = (ErrorSource("gain", "", {BenchError(gain=1.0): 1.0}),)
+    information, nothing = np.array([[4.0]]), np.zeros((1, 1))
+    learned = LearnedErrors(source, np.zeros(1, int), np.array([2.4]), np.array([[0.2]]), information, nothing, nothing, {})
+    draws = learned.draw(10**6, 5)
+    assert np.mean(draws) == pytest.approx(2.4, abs=0.003)
+    assert np.var(draws) == pytest.approx(0.2, rel=0.01)
+
+
+def bench(path, gain=0.0, exponent=0.0, seed=1):
+    """Write a sweep of eight mountings whose output cell reads too much, or whose friction depends on the mean tension."""
+    rng, rows = np.random.default_rng(seed), ["run,stroke,input_force_N,output_force_N,wrap_angle_deg"]
+    middle = np.exp(np.mean(np.log(LOADS)))
+    for number, bend in enumerate(np.linspace(45, 270, 8)):
+        mounting = rng.normal(0, 0.015)
+        for stroke in (1, -1):
+            for load in LOADS:
+                loss = 0.0
+                for _ in range(20):
+                    loss = MU * (load * np.exp(-stroke * loss / 2) / middle) ** exponent * np.radians(bend) + mounting
+                output = load * np.exp(-stroke * loss) * (1 + gain) * (1 + rng.normal(0, 0.004))
+                rows.append(f"m{number},{'pull' if stroke > 0 else 'return'},{load},{output:.5f},{bend:.1f}")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def learned(fit, name):
+    return next(error for error in fit.error_budget.learned if name in error.name)
+
+
+def test_a_gain_within_its_stated_limit_is_learned_trusted_and_corrected_for(tmp_path):
+    fit = bf.fit(bench(tmp_path / "bench.csv", gain=0.03), seed=1, settings=["errors.gain=0.04"])
+    gain, interval = learned(fit, "gain"), fit.error_budget.row("mu").bench
+    assert fit.verdict().trusted and not fit.verdict().doubts
+    assert gain.is_learned and abs(gain.mean - 3.0) < 3 * gain.sd < 2.5
+    assert interval.q05 < MU < interval.q95
+    assert "the gain of the output's load cell" in " ".join(fit.error_budget.sentences())
+    angle = learned(fit, "in proportion")  # which looks like friction
+    assert angle.sd == pytest.approx(angle.limit_sd, rel=0.02) and not angle.is_learned
+
+
+def test_a_gain_beyond_its_limit_is_not_explained_away(tmp_path):
+    fit = bf.fit(bench(tmp_path / "bench.csv", gain=0.03), seed=1, settings=["errors.gain=0.002"])
+    assert not fit.verdict().trusted
+    assert "stroke" in {departure.against.lower() for departure in fit.least_squares.departures if departure.is_noticeable}
+
+
+def test_a_load_exponent_within_its_stated_limit_is_learned_inside_runs(tmp_path):
+    path = bench(tmp_path / "bench.csv", exponent=-0.1)
+    fit = bf.fit(path, seed=1, settings=["errors.load_exponent=0.15"])
+    exponent = learned(fit, "exponent")
+    assert fit.verdict().trusted
+    assert exponent.mean == pytest.approx(-0.1, abs=3 * exponent.sd) and exponent.is_learned
+    assert not bf.fit(path, seed=1, settings=["errors.load_exponent=0.01"]).verdict().trusted
+
+
+def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):
+    path = bench(tmp_path / "bench.csv")
+    fit, alone = bf.fit(path, seed=1), bf.fit(path, seed=1, errors="none")
+    assert fit.verdict().trusted and not any(error.contradicts_limit for error in fit.error_budget.learned)
+    assert fit.error_budget.row("mu").readings == alone.parameter("mu") == fit.parameter("mu")
+
+
+def test_the_order_of_mountings_is_centered():
+    assert order_of(np.array([0, 0, 1, 2]), 3).tolist() == [-0.5, -0.5, 0.0, 0.5]
+    assert order_of(np.array([0, 0]), 1).tolist() == [0, 0]
+
+
+def test_wear_and_load_scale_the_loss():
+    forces = np.array([100.0, 100.0, 0.0])
+    worn = BenchError(wear=0.2).apply_to_friction(forces, np.array([50.0, 50.0, 0.0]), np.array([-0.5, 0.5, 0.5]))
+    assert np.log(100 / worn[:2]) == pytest.approx(np.log(2) * np.array([0.9, 1.1]))
+    assert worn[2] == 0
+    loaded = BenchError(load_exponent=0.1).apply_to_friction(np.array([50.0, 100.0, 200.0]), np.array([25.0, 50.0, 100.0]))
+    assert np.log(np.array([50.0, 100.0, 200.0]) / loaded) == pytest.approx(np.log(2) * 2.0 ** np.array([-0.1, 0, 0.1]))

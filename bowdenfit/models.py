@@ -26,7 +26,7 @@ from bowdenfit.errors import DescriptionError, suggest_name
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.covariates import Covariates, collect_covariates
-from bowdenfit.kinds.runs import RunsData
+from bowdenfit.kinds.runs import RunsData, RunsTerm
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Term, find_row_angles
 from bowdenfit.kinds.terms import TERMS, collect_parameters, iterate_term_kinds, make_measured_cable
@@ -60,7 +60,8 @@ class Model(Display):
         """Return all terms with the data that a bench with a systematic error would have given."""
         tables = {kind.name: kind.with_bench_error(table, error) for kind, table in iterate_tables(self.measurements)}
         angles = Measurements(tuple(tables.values())).table(AngleTable)
-        terms: list[Any] = [t for name, table in tables.items() for t in TERMS[name].terms(self.cable, table, angles)]
+        changed: list[Any] = [t for name, table in tables.items() for t in TERMS[name].terms(self.cable, table, angles)]
+        terms = [_in_same_cells(term, other) for term, other in zip(self.terms, changed, strict=True)]
         return tuple(replace(term, data=_with_constant_angles(term.data, self.cable, error)) for term in terms)
 
     def sentences(self) -> list[str]:
@@ -89,6 +90,11 @@ def build_model(dataset: Dataset) -> Model:
         kind.check(table, space)
     places = {term.name: collect_covariates(description, measurements, term) for term in terms}
     return Model(cable, space, tuple(terms), places, measurements)
+
+
+def _in_same_cells(term: Any, changed: Any) -> Any:
+    """Return a changed term whose readings are in the cells of the original: equal loads may differ by an error."""
+    return term.with_rows(changed.rows) if isinstance(term, RunsTerm) and changed.rows is not None else changed
 
 
 def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) -> Any:

@@ -157,7 +157,8 @@ def _learn(
             numbers.append(number)
     errors = np.stack(columns, axis=1)
     readings = {name: np.stack([of_error[name] for of_error in of_readings], axis=1) for name in inside}
-    moves = -np.linalg.solve(np.diag(np.where(prior > 0, prior**2, 1.0)) + jacobian.T @ jacobian, jacobian.T @ errors)
+    with_priors = np.concatenate([jacobian, np.diag(np.where(prior > 0, prior, 1.0))])
+    moves = -np.linalg.lstsq(with_priors, np.concatenate([errors, np.zeros((len(prior), len(numbers)))]), rcond=None)[0]
     remaining = errors + jacobian @ moves
     information, gradient = errors.T @ remaining, remaining.T @ residuals + moves.T @ (prior * z)
     for name, single in readings.items():  # parameters do not follow readings inside cells

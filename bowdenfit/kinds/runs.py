@@ -135,6 +135,7 @@ class RunsTerm:
         name: Name of the readings in results.
         reading_noise: Parameter that is the standard deviation of one reading.
         rows: The readings that the arrays sum up; None where nobody asks for them one by one.
+        cell_rows: Readings by which they were sorted into cells; None where these are `rows` themselves.
     """
 
     cable: CableContacts = field(repr=False)
@@ -145,6 +146,11 @@ class RunsTerm:
     unit: str = "1"
     noise: str = RUN_SCATTER
     rows: SlidingRows | None = field(default=None, repr=False)
+    cell_rows: SlidingRows | None = field(default=None, repr=False)
+
+    def with_rows(self, rows: SlidingRows) -> "RunsTerm":
+        """Return the term of the same readings with other forces or angles, sorted into the same cells."""
+        return replace(self, data=sum_runs(self.cable, rows, self.rows), rows=rows, cell_rows=self.rows)
 
     @property
     def depends_on_conditions(self) -> bool:
@@ -178,7 +184,7 @@ class RunsTerm:
         """Single readings, with the cell of each among the residuals inside runs."""
         if self.rows is None:
             return None
-        cell, first = _assign_cells(self.cable, self.rows)
+        cell, first = _assign_cells(self.cable, self.cell_rows or self.rows)
         runs, run = np.unique(self.rows.run, return_inverse=True)
         of_cell = np.searchsorted(runs, self.rows.run[first])
         position = np.arange(len(first)) - np.searchsorted(of_cell, of_cell)
@@ -308,9 +314,15 @@ class _Deviations:
     inside: Array
 
 
-def sum_runs(cable: CableContacts, rows: SlidingRows) -> RunsData:
-    """Reduce readings to cells and cells to runs: all that the likelihood needs, whatever the number of readings."""
-    cell, first = _assign_cells(cable, rows)
+def sum_runs(cable: CableContacts, rows: SlidingRows, cell_rows: SlidingRows | None = None) -> RunsData:
+    """Reduce readings to cells and cells to runs: all that the likelihood needs, whatever the number of readings.
+
+    Args:
+        cable: The cable.
+        rows: The readings.
+        cell_rows: The same readings as they are sorted into cells; `rows` themselves if omitted.
+    """
+    cell, first = _assign_cells(cable, cell_rows or rows)
     weight = rows.weight(cable.description.sensors.noise_ratio)
     cell_weight = np.bincount(cell, weight)
 

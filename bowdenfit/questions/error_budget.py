@@ -29,15 +29,16 @@ from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
 from bowdenfit.words import filled, listed, significant, table
 
+_ROUNDING = 1e-6  # of a standard deviation, below which an error does not move an answer
 _NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then add more than half to it
 _LEARNED = 0.5  # share of the uncertainty of an error, below which readings have determined it; a judgement
 _SHOWN_ERRORS = {  # words, unit and factor in which an error is shown, by field of `BenchError`
-    "gain": ("the gain of the output's load cell over that of the input's", "%", 100.0),
+    "gain": ("the gain error of the output's load cell relative to the input's", "%", 100.0),
     "hysteresis": ("the hysteresis of the load cells", "%", 100.0),
-    "angle_scale": ("the wrap angles, in proportion,", "%", 100.0),
-    "angle_offset": ("the wrap angles, all alike,", "deg", float(np.rad2deg(1.0))),
-    "wear": ("friction from the first mounting to the last", "%", 100.0),
-    "load_exponent": ("the exponent of the load", "", 1.0),
+    "angle_scale": ("the relative error of all wrap angles", "%", 100.0),
+    "angle_offset": ("the offset of all wrap angles", "deg", float(np.rad2deg(1.0))),
+    "wear": ("the change of friction from the first mounting to the last", "%", 100.0),
+    "load_exponent": ("the load exponent", "", 1.0),
 }
 TITLE = "Error budget: what bench errors add"
 _INCLUDED = "The intervals of the first page include them."
@@ -111,7 +112,7 @@ class LearnedError:
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
-        return f"{self.name} is off by {significant(self.mean, 2)} ± {significant(self.sd, 1)}{unit}"
+        return f"{self.name} is {significant(self.mean, 2)} ± {significant(self.sd, 1)}{unit}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -215,6 +216,7 @@ def error_budget(fit: Record) -> ErrorBudget | None:
     for name, (unit, draws) in quantities.items():
         moved = with_errors[name][1]
         slopes = np.linalg.lstsq(deviations, moved - draws, rcond=None)[0]
+        slopes[np.abs(slopes) < _ROUNDING * np.std(draws)] = 0.0
         shifts = {
             source.name: float(np.std(deviations[:, learned.source == number] @ slopes[learned.source == number]))
             for number, source in enumerate(learned.sources)

@@ -73,8 +73,8 @@ def test_a_gain_within_its_stated_limit_is_learned_trusted_and_corrected_for(tmp
     assert fit.verdict().trusted and not fit.verdict().doubts
     assert gain.is_learned and abs(gain.mean - 3.0) < 3 * gain.sd < 2.5
     assert interval.q05 < MU < interval.q95
-    assert "the gain of the output's load cell" in " ".join(fit.error_budget.sentences())
-    angle = learned(fit, "in proportion")  # which looks like friction
+    assert "the gain error of the output's load cell" in " ".join(fit.error_budget.sentences())
+    angle = learned(fit, "relative error")  # which looks like friction
     assert angle.sd == pytest.approx(angle.limit_sd, rel=0.02) and not angle.is_learned
 
 

@@ -172,7 +172,7 @@ def with_bench_errors(fit: Record) -> Record:
     likelihood, is left out: readings have the errors, parameters have not.
     """
     learned = learned_errors(fit)
-    if learned is None:
+    if learned is None or fit.draws().has_bench_errors:
         return fit
     draws = fit.draws()
     z = draws.flat_z + learned.draw(len(draws.flat_z), fit.provenance.seed) @ learned.moves.T
@@ -195,6 +195,7 @@ def with_bench_errors(fit: Record) -> Record:
         log_likelihood={},
         expected={},
         replicated={},
+        has_bench_errors=True,
     )
     return replace(fit, sampled=moved)
 

@@ -56,6 +56,7 @@ class Draws(Display):
         trajectories: How the trajectories of NUTS went.
         agreement: Whether a second sampler agrees, where one was asked.
         units: Units of values and optimum by name, where a fit gives them.
+        has_bench_errors: Whether they are moved by draws of the errors of the bench.
     """
 
     z: np.ndarray
@@ -74,6 +75,7 @@ class Draws(Display):
     pareto_k: float | None = None
     agreement: SamplerAgreement | None = None
     units: dict[str, str] = field(default_factory=dict)
+    has_bench_errors: bool = False
 
     @property
     def n_effective(self) -> float:

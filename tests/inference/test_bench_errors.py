@@ -9,6 +9,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.inference.bench_errors import LearnedErrors
 from bowdenfit.kinds.bench_error import BenchError, ErrorSource, order_of
+from bowdenfit.questions.error_budget import with_bench_errors
 
 MU, LOADS = 0.15, (20.0, 40.0, 80.0, 120.0)
 
@@ -97,6 +98,8 @@ def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):
     path = bench(tmp_path / "bench.csv")
     fit, alone = bf.fit(path, seed=1), bf.fit(path, seed=1, errors="none")
     assert fit.verdict().trusted and not any(error.contradicts_limit for error in fit.error_budget.learned)
+    moved = with_bench_errors(fit)
+    assert with_bench_errors(moved) is moved
     assert fit.error_budget.row("mu").readings == alone.parameter("mu") == fit.parameter("mu")
 
 

@@ -13,6 +13,16 @@
     }
     return refusals;
   };
+  globalThis.copyText = async button => {
+    const words = button.parentElement.querySelector("pre").textContent;
+    try {
+      await navigator.clipboard.writeText(words);
+      button.textContent = "Copied";
+    } catch {
+      button.textContent = "Select it, and copy it by hand";
+    }
+    setTimeout(() => { button.textContent = "Copy"; }, 2000);
+  };
   // A point of a chart that is clicked shows its row; both have the same key.
   document.addEventListener("pick", event => {
     const row = document.querySelector(`[data-row-key="${CSS.escape(event.detail)}"]`);

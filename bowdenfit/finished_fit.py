@@ -28,6 +28,12 @@ from bowdenfit.questions.figures import (
 from bowdenfit.questions.groups import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import assess_identifiability
+from bowdenfit.questions.identify.likelihood import (
+    LikelihoodContour,
+    ProfileLikelihood,
+    contour_parameters,
+    profile_parameter,
+)
 from bowdenfit.questions.predict.predictions import prediction_blocks
 from bowdenfit.questions.summary.brief import summary_blocks
 from bowdenfit.questions.summary.details import posterior_intervals
@@ -129,6 +135,22 @@ class Fit(Record):
             UsageError: The fit has no draws.
         """
         return self.posterior.to_frame()[[p.name for p in self.model.space.free]].corr()
+
+    def profile(self, name: str) -> ProfileLikelihood:
+        """Return how -2 log L rises along one parameter, all others fitted again; its `plot()` is the figure.
+
+        Raises:
+            UsageError: There is no such free parameter, or it is a scale of noise.
+        """
+        return profile_parameter(self, name)
+
+    def contour(self, first: str, second: str) -> LikelihoodContour:
+        """Return how -2 log L rises over two parameters, all others fitted again; its `plot()` is the figure.
+
+        Raises:
+            UsageError: There is no such free parameter, one is a scale of noise, or both are the same.
+        """
+        return contour_parameters(self, first, second)
 
     def summary(self) -> Summary:
         """Return everything on one page, for programs (the contents of summary.json)."""

@@ -63,6 +63,7 @@ class DataSetPage:
             with section("Change it", "add"), block("div", "row"):
                 show_table_links(workbench, name)
                 link("Describe the cable", address("describe", name), "button")
+                link("Try by hand", address("try", name), "button")
                 link("Live: fit again after each mounting", address("live", name), "button")
             with section("Fits of it", "history"):
                 history = block("div")

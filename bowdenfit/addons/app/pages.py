@@ -16,6 +16,7 @@ from bowdenfit.addons.app.frame import frame, refused, style_and_script
 from bowdenfit.addons.app.live import LivePage
 from bowdenfit.addons.app.see import FitPage
 from bowdenfit.addons.app.side_by_side import TwoFitsPage
+from bowdenfit.addons.app.try_page import TryPage
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_policy
@@ -82,6 +83,10 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
             _show_refusal(name, str(error))
         else:
             LivePage(workbench, name)
+
+    @ui.page("/try/{name}")
+    def try_by_hand(name: str, fit: str = "") -> None:
+        _show_unless_refused("Try by hand", lambda: TryPage(workbench, name, fit))
 
     @ui.page("/compare")
     def compare(one: str = "", other: str = "") -> None:

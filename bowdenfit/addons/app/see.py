@@ -37,6 +37,7 @@ from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.verb import Reply
 
 if TYPE_CHECKING:
+    from bowdenfit.finished_fit import Fit
     from bowdenfit.results.record import Record
 
 _TICK = 0.5  # s between two looks at a fit that runs; a judgement
@@ -188,6 +189,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         command.show(*(write_command(verb, request, workbench.folder) for verb, request in shown))
     with left:
         show_arriving(workbench, fit, name)
+        _show_trying(workbench, fit, name)
         show_next(workbench, fit, name)
         show_files(workbench, name)
         _show_keeping(workbench, name)
@@ -200,6 +202,13 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         for heading, key, html in parts:
             with section(heading, key):
                 markup(html, "div")
+
+
+def _show_trying(workbench: Workbench, fit: "Fit", name: str) -> None:
+    """Show the way to trying coefficients by hand, where the data set of a fit is here as it was fitted."""
+    if data_set := workbench.data_set_of(fit, name):
+        with block("div", "row"):
+            link("Try by hand, and its likelihood", address("try", data_set, fit=name), "button")
 
 
 def _show_keeping(workbench: Workbench, name: str) -> None:

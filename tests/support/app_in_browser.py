@@ -21,7 +21,7 @@ _SHELL_WORDS = r"""() => {
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
   while (texts.nextNode()) {
     const words = texts.currentNode.data, element = texts.currentNode.parentElement;
-    if (element.closest("script, style, .equivalent")) continue;
+    if (element.closest("script, style, .equivalent, .toml")) continue;
     if (/\bbowdenfit [a-z]|Ctrl-C|terminal|(^|[\s(])--[a-z]/.test(words)) found.push(`of a shell: ${words.slice(0, 80)}`);
   }
   return found;

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.check.data_set_words import Report
 
 ChangeRow: TypeAlias = Callable[[str, str, int, str | None], Awaitable[None]]
+_BY_USER = "left out by the user"  # in notes that stay in sight
 _MOST_ROWS = 400  # of a file, that a page shows; a judgement
 _MOST_COLUMNS = 12  # of a row; a judgement
 _ROW_CLICKED = """event => {
@@ -133,8 +134,15 @@ def show_checked(report: "Report") -> None:
     with block("ul"):
         for line in (line for heading, lines in described if not heading for line in lines):
             text(line.strip(), "li")
-        for remark in report.measurements.remarks:
+        excluded = [remark for remark in report.measurements.remarks if _BY_USER in remark]
+        for remark in excluded:
             text(page_words(remark), "li", "hint")
+    if others := [remark for remark in report.measurements.remarks if remark not in excluded]:
+        with block("details"):
+            text(counted(len(others), "note"), "summary")
+            with block("ul"):
+                for remark in others:
+                    text(page_words(remark), "li", "hint")
     for heading, lines in described:
         if heading:
             with block("details"):

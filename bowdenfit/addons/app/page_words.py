@@ -23,6 +23,7 @@ _PLACES = {
 }  # fmt: skip
 _COMMAND = re.compile(rf"`?\bbowdenfit ({'|'.join(_PLACES)})\b(?: --full| FOLDER| FILE)?`?")
 _KEYS = {"friction": "friction_model"}  # of options that have another name in cable.toml
+_NEXT_SOURCE = re.compile(r"( as \w+(?: in \S+)?) (?=(?:column|channel) ')")
 _HTML = re.compile(r"(<(script|style)\b.*?</\2>|<[^>]*>)", re.DOTALL)
 _WHOLE: tuple[tuple[str, str], ...] = (
     ("Everything else: bowdenfit summary --full", ""),
@@ -48,6 +49,7 @@ def page_words(sentence: str) -> str:
     rules: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
         (_MISSING, lambda match: f"{match[1]}{match[2]} in cable.toml"),
         (_SOURCE, _name_source),
+        (_NEXT_SOURCE, lambda match: f"{match[1]} and "),
         (_SETTING, _name_setting),
         (_COMMAND, lambda match: _PLACES[match[1]]),
         (_VALUE, lambda match: f"{_NAMES[match[1]]} {match[2]}"),

@@ -32,7 +32,7 @@ from bowdenfit.questions.start.question import (
 )
 from bowdenfit.reading import Reading, read
 from bowdenfit.recordings.named_channels import parse_channels
-from bowdenfit.words import listed
+from bowdenfit.words import listed, shown
 
 _REMARKS = {
     "schema": "Written by `bowdenfit init` from the files next to it; `bowdenfit check` says how it is understood.",
@@ -182,13 +182,32 @@ def _table_entries(measured_files: Sequence[MeasuredFile]) -> dict[str, Any]:
         for file in group:
             settings |= file.settings
         if any(columns != columns_by_file[0] for columns in columns_by_file):
-            raise DatasetError(
-                f"the columns of {listed([file.name for file in group])} are not called alike; give them the same headings, or "
-                "put them into one file."
-            )
+            raise DatasetError(_describe_other_headings(group))
         place = _files_and_sheets(group)
         tables[kind.name] = {**place, **settings, **({"columns": columns_by_file[0]} if columns_by_file[0] else {})}
     return tables
+
+
+def _describe_other_headings(group: Sequence[MeasuredFile]) -> str:
+    """Say which columns of tables that belong together have other headings."""
+    differing = [
+        name
+        for name in dict.fromkeys(name for file in group for name in file.assigned)
+        if len({_named_sources(file).get(name, {}).get("name") for file in group}) > 1
+    ]
+    clauses = []
+    for name in differing:
+        by_heading: dict[str, list[str]] = {}
+        for file in group:
+            by_heading.setdefault(file.assigned.get(name, ""), []).append(file.name)
+        places = [f"{shown(heading) if heading else 'no column'} in {listed(files)}" for heading, files in by_heading.items()]
+        clauses.append(f"{name} is {'; '.join(places)}")
+    files = listed([file.name for file in group])
+    which = f": {'. '.join(clauses)}" if clauses else ""
+    return (
+        f"the columns of {files} are not called alike{which}. The usual cause is a heading that somebody typed again; give "
+        "these columns the same heading in all files, or leave a file out and fit it by itself."
+    )
 
 
 def _files_and_sheets(group: Sequence[MeasuredFile]) -> dict[str, Any]:
@@ -198,14 +217,15 @@ def _files_and_sheets(group: Sequence[MeasuredFile]) -> dict[str, Any]:
         DatasetError: Sheets of several workbooks have different titles.
     """
     files = list(dict.fromkeys(file.path.name for file in group))
-    sheets = list(dict.fromkeys(file.sheet for file in group))
-    if len(files) * len(sheets) != len(group):
+    sheets = list(dict.fromkeys(file.sheet for file in group if file.sheet))
+    on_sheets = [file for file in group if file.sheet]
+    if len({file.path.name for file in on_sheets}) * len(sheets) != len(on_sheets):
         raise DatasetError(
             f"the sheets of {listed([file.name for file in group])} have different titles; give them the same, or leave a "
             "file out."
         )
     entries: dict[str, Any] = {"files": files} if len(files) > 1 else {"file": files[0]}
-    return entries | ({"sheet": sheets[0] if len(sheets) == 1 else sheets} if any(sheets) else {})
+    return entries | ({"sheet": sheets[0] if len(sheets) == 1 else sheets} if sheets else {})
 
 
 def _named_sources(file: MeasuredFile) -> dict[str, Any]:
@@ -229,6 +249,8 @@ def _recording_entries(
                 f"{file.name} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
             )
             words = f"What was the wrap angle of {file.name}, with its unit?"
+            if stated:
+                reason = f"{file.name}: {stated[0]} is what {stated[1]} says; confirm it, or write the right one."
             value, unit = asker.ask(quantity_question(words, "angle", "90 deg", reason, stated[0] if stated else None))
             entry.setdefault("wrap_angles", {})[name] = {"value": value, "unit": unit}
         channels = _named_sources(file)

@@ -13,6 +13,8 @@ from bowdenfit.addons.app.page_words import page_html, page_words
     [
         ("Name it: --column wrap_angle='Bend (x):deg', or leave it.",
          "Name it: column 'Bend (x)' as wrap_angle in deg, or leave it."),
+        ("say so: --column input_force='F 2' --column output_force='F 1'.",
+         "say so: column 'F 2' as input_force and column 'F 1' as output_force."),
         ("by --channel input_force=ai0.", "by channel 'ai0' as input_force."),
         ("write --missing -9999 (in cable.toml missing = [-9999]), or", "write missing = [-9999] in cable.toml, or"),
         ("--seed = 'many' must be a whole number.", "seed = 'many' must be a whole number."),

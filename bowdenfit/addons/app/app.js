@@ -37,6 +37,7 @@
   document.addEventListener("focusin", event => { last = event.target.dataset?.key ?? null; });
   const tidy = () => {
     globalThis.drawCharts?.();
+    document.querySelector("main.q-page")?.setAttribute("role", "none"); // NiceGUI's own, around ours
     if (last && document.activeElement === document.body) document.querySelector(`[data-key="${CSS.escape(last)}"]`)?.focus({ preventScroll: true });
   };
   const start = () => { new MutationObserver(tidy).observe(document.body, { childList: true, subtree: true }); tidy(); };

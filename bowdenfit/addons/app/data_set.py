@@ -16,8 +16,8 @@ from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
 from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.questions.check import check_data_set
 from bowdenfit.questions.check.verb import VERB as CHECK
-from bowdenfit.questions.check.verb import check
 from bowdenfit.run.verb import VERB as FIT
 
 
@@ -40,10 +40,13 @@ class DataSetPage:
     Args:
         workbench: Where it lies.
         name: Name of the data set.
+
+    Raises:
+        UsageError: There is no such data set.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:
-        self._workbench, self._name = workbench, name
+        self._workbench, self._name, self._folder = workbench, name, workbench.data_set(name)
         self._fit_name, self._seed = workbench.free_name(name), ""
         with frame(workbench.title_of(name)):
             with section("Fit it", "fit"):
@@ -68,7 +71,7 @@ class DataSetPage:
             with section("Fits of it", "history"):
                 history = block("div")
             with section("What was measured", "understood"):
-                show_command(CHECK, {"dataset": workbench.data_set(name)}, workbench.folder, key="check-command")
+                show_command(CHECK, {"dataset": self._folder}, workbench.folder, key="check-command")
                 self._place = block("div", aria_live="polite")
         with self._place:
             text("Reading ...")
@@ -129,9 +132,9 @@ class DataSetPage:
 
     async def _look(self) -> None:
         """Show what `check` says, and what was measured."""
-        folder, report, error = self._workbench.data_set(self._name), None, None
+        folder, report, error = self._folder, None, None
         try:
-            report = await self._workbench.compute(check, folder)
+            report = await self._workbench.compute(check_data_set, folder, {})
         except BowdenfitError as caught:
             error = caught
         self._place.clear()
@@ -148,9 +151,8 @@ class DataSetPage:
         Raises:
             UsageError, DescriptionError, StoreError: cable.toml cannot be changed so.
         """
-        folder = self._workbench.data_set(self._name)
         if reason is None:
-            await self._workbench.compute(include_row, folder, kind, file, row)
+            await self._workbench.compute(include_row, self._folder, kind, file, row)
         else:
-            await self._workbench.compute(exclude_row, folder, kind, file, row, reason)
+            await self._workbench.compute(exclude_row, self._folder, kind, file, row, reason)
         await self._look()

@@ -89,10 +89,14 @@ class LivePage:
     Args:
         workbench: Where it lies.
         name: Name of the data set.
+
+    Raises:
+        UsageError: There is no such data set.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:
         self._workbench, self._name, self._shown, self._until = workbench, name, -1, ""
+        self._folder = workbench.data_set(name)
         title = workbench.title_of(name)
         with frame("Live", ((title, address("data", name)),)):
             text("Whenever a file of this data set has a new complete row or recording, it is read and fitted again.")
@@ -130,14 +134,14 @@ class LivePage:
     def _example(self) -> str:
         """A standard deviation that this cable can be known to: of its best length, or of a coefficient."""
         with suppress(BowdenfitError):
-            route = load_description(self._workbench.data_set(self._name) / DESCRIPTION_FILE, faults=Faults()).route
+            route = load_description(self._folder / DESCRIPTION_FILE, faults=Faults()).route
             return f"10{route.unit}" if route is not None else "0.005"
         return "0.005"
 
     @property
     def _written(self) -> str:
         """The command that watches as the button does."""
-        request = request_watching(self._workbench.data_set(self._name), self._until)
+        request = request_watching(self._folder, self._until)
         return write_command(WATCH, request, self._workbench.folder)
 
     def _state_until(self, typed: str) -> None:
@@ -147,7 +151,7 @@ class LivePage:
     def _start(self) -> None:
         if self._bench is not None and self._bench.running:
             raise UsageError(f"{self._workbench.title_of(self._name)} is watched already; stop that first.")
-        self._workbench.watched[self._name] = WatchedBench(self._workbench.data_set(self._name), self._until)
+        self._workbench.watched[self._name] = WatchedBench(self._folder, self._until)
         self._shown = -1
         self._draw()
 

@@ -51,12 +51,7 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
 
     @ui.page("/data/{name}")
     def data_set(name: str) -> None:
-        try:
-            workbench.data_set(name)
-        except BowdenfitError as error:
-            _show_refusal(name, str(error))
-        else:
-            DataSetPage(workbench, name)
+        _show_unless_refused(name, lambda: DataSetPage(workbench, name))
 
     @ui.page("/describe/{name}")
     def describe(name: str) -> None:
@@ -68,21 +63,11 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
 
     @ui.page("/fit/{name}")
     def fit(name: str) -> None:
-        try:
-            workbench.results(name)
-        except BowdenfitError as error:
-            _show_refusal(name, str(error))
-        else:
-            FitPage(workbench, name)
+        _show_unless_refused(name, lambda: FitPage(workbench, name))
 
     @ui.page("/live/{name}")
     def live(name: str) -> None:
-        try:
-            workbench.data_set(name)
-        except BowdenfitError as error:
-            _show_refusal(name, str(error))
-        else:
-            LivePage(workbench, name)
+        _show_unless_refused(name, lambda: LivePage(workbench, name))
 
     @ui.page("/try/{name}")
     def try_by_hand(name: str, fit: str = "") -> None:

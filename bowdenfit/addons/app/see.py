@@ -49,10 +49,14 @@ class FitPage:
     Args:
         workbench: Where the fit is.
         name: Name of the fit.
+
+    Raises:
+        UsageError: There is no such fit.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:
         self._workbench, self._name = workbench, name
+        workbench.results(name)
         self._running: tuple[tuple[ui.html, ui.html, ui.html], FitJob] | None = None
         self._answered = False  # whether the answer of the fit that runs is shown
         with frame(name):

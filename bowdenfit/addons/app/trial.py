@@ -136,8 +136,9 @@ class TrialModel:
         return Trial(numbers, float(squares), float(likelihood), expected, efficiency)
 
     def draw(self, trial: Trial) -> list[Chart]:
-        """Return a chart for each kind of reading: as measured, and as the model expects it."""
-        return [self._draw_term(term, trial) for term in self._model.terms]
+        """Return a chart for each kind of reading, as measured and by the model; wrap angles last, as coefficients leave them."""
+        terms = sorted(self._model.terms, key=lambda term: term.name == "wrap_angle")
+        return [self._draw_term(term, trial) for term in terms]
 
     def _draw_term(self, term: Term, trial: Trial) -> Chart:
         """Return the chart of one kind of reading."""

@@ -34,8 +34,8 @@ def test_the_misfit_and_the_curve_are_those_of_the_model():
         assert trial.squares == pytest.approx(float(np.sum(model.residuals(values) ** 2)))
         expected = np.asarray(model.expected(values)["run_efficiency"])
     (chart,) = tried.draw(trial)
-    drawn = [y for group in chart.groups for series in group.series if series.color == "vermillion" for y in series.values]
-    assert sorted(drawn) == pytest.approx(sorted(100 * expected))
+    by_model = [y for group in chart.groups for series in group.series if series.color == "vermillion" for y in series.values]
+    assert sorted(by_model) == pytest.approx(sorted(100 * expected))
     held = bf.read(YARN, settings=[tried.hold("mu", 0.1234)])
     assert held.description.friction["mu"].fixed == 0.1234
 

@@ -68,12 +68,12 @@ def test_the_charts_of_residuals_name_their_rows(sampled):
 
 
 @pytest.mark.extended
-def test_a_reading_outside_the_range_stands_beside_the_interval_of_its_prediction(quick_fit):
+def test_a_reading_outside_the_range_has_the_interval_of_its_prediction(quick_fit):
     (chart,) = make_efficiency_chart(efficiency_figure.data(quick_fit))
     (points,) = [group for group in chart.groups if 550.0 in group.x]
-    at = {(series.label, series.look): series.values[points.x == 550.0][0] for series in points.series}
-    low, high = at["Predicted there, 90 % interval", "from"], at["Predicted there, 90 % interval", "to"]
-    assert 60 < low < at["Predicted there", "hollow"] < high < 76
+    values = {(series.label, series.look): series.values[points.x == 550.0][0] for series in points.series}
+    low, high = values["Predicted there, 90 % interval", "from"], values["Predicted there, 90 % interval", "to"]
+    assert 60 < low < values["Predicted there", "hollow"] < high < 76
 
 
 def test_the_chart_of_the_loss_names_its_contacts():

@@ -136,7 +136,7 @@ class TrialModel:
         return Trial(numbers, float(squares), float(likelihood), expected, efficiency)
 
     def draw(self, trial: Trial) -> list[Chart]:
-        """Return a chart for each kind of reading, as measured and by the model; wrap angles last, as coefficients leave them."""
+        """Return a chart for each kind of reading, as measured and by the model; wrap angles, which stay as they are, last."""
         terms = sorted(self._model.terms, key=lambda term: term.name == "wrap_angle")
         return [self._draw_term(term, trial) for term in terms]
 

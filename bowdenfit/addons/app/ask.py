@@ -108,12 +108,12 @@ class ArrivingForce:
             while answered != self._asked:
                 answered = self._asked
                 request = self._dials.request_dials(self._fit, self._values, self._way == "in", self._stroke)
-                self._command.show(write_command(PREDICT, {"fit": self._results, **request}, self._workbench.folder))
                 try:
                     words = render_html(blocks_of(await self._workbench.compute(partial(predict, self._fit, **request))))
                 except BowdenfitError as error:
                     words = render_html([str(error)])
                 self._place.set_content(page_html(words))
+                self._command.show(write_command(PREDICT, {"fit": self._results, **request}, self._workbench.folder))
                 await asyncio.sleep(0)
         finally:
             self._busy = False

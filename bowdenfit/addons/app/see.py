@@ -141,7 +141,9 @@ class FitPage:
 
         async def start(resume: bool) -> None:
             def go_on() -> None:
-                request = self._workbench.request_fit(self._name, chosen["name"], resume=resume, force=not resume)
+                settings = job.request.settings if job is not None else ()
+                changes: dict[str, Any] = {"resume": resume, "force": not resume, "settings": settings}
+                request = self._workbench.request_fit(self._name, chosen["name"], **changes)
                 self._workbench.start_fit(request)
 
             if await attempt(go_on):

@@ -152,9 +152,10 @@ class TrialModel:
             lines.append(_line(self._lengths, trial.efficiency))
         groups, along_route = np.array(covariates.group or [""] * len(x)), bool(lines)
         for rows in (np.flatnonzero(groups == name) for name in dict.fromkeys(groups)):
-            if not along_route and len(np.unique(x[rows])) == len(rows) > 1:  # readings of one curve
-                order = rows[np.argsort(x[rows])]
-                lines.append(_line(x[order], expected[order]))
+            x_once, first, number = np.unique(x[rows], return_index=True, return_inverse=True)
+            along_x = expected[rows][first]
+            if not along_route and len(x_once) > 1 and np.allclose(along_x[number], expected[rows]):  # one curve
+                lines.append(_line(x_once, along_x))
             else:
                 points.append(Points("By the model", "vermillion", "hollow", x[rows], expected[rows]))
         return make_chart(words, label, f"{words} ({unit})", points, lines)

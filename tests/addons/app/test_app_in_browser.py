@@ -151,7 +151,8 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
         page.wait_for_function("document.querySelector('#arrives').innerText.includes(document.querySelector('output').innerText)")
         length, force = (page.inner_text(f"output[for=dial-{number}]") for number in (0, 1))
         assert [float(page.input_value(f"#dial-{number}")) for number in (0, 1)] == [float(length), float(force)]
-        assert page.text_content("#predict-command") == f"bowdenfit predict fits/on-body {length} --input-force {force}N"
+        command = f"bowdenfit predict fits/on-body {length} --input-force {force}N"
+        page.wait_for_function("words => document.querySelector('#predict-command').textContent === words", arg=command)
         assert text_on(page, "#arrives").split() == printed_by_shown(page, "predict", folder).split()
         page.get_by_role("button", name="Rank what could be measured next").click()
         page.locator("#ranking table").wait_for()

@@ -35,7 +35,7 @@ def test_the_misfit_and_the_curve_are_those_of_the_model():
         expected = np.asarray(model.expected(values)["run_efficiency"])
     (chart,) = tried.draw(trial)
     by_model = [y for group in chart.groups for series in group.series if series.color == "vermillion" for y in series.values]
-    assert sorted(by_model) == pytest.approx(sorted(100 * expected))
+    assert set(np.round(by_model, 6)) == set(np.round(100 * expected, 6))  # a line through each wrap angle once
     held = bf.read(YARN, settings=[tried.hold("mu", 0.1234)])
     assert held.description.friction["mu"].fixed == 0.1234
 

@@ -158,6 +158,10 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
         place = block("div")
 
     async def look_again() -> None:
+        if draft.files and not (draft.is_arriving or draft.understanding.files):
+            place.clear()
+            with place:
+                text("Reading the files ...", role="status")
         understanding = Understanding() if draft.is_arriving else await workbench.compute(draft.understand)
         place.clear()
         with place:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from inspect import Parameter as Stated
-from inspect import signature, unwrap
+from inspect import cleandoc, signature, unwrap
 from numbers import Integral, Number, Real
 from os import PathLike
 from pathlib import Path
@@ -37,6 +37,7 @@ LARGEST_SEED = 2**31 - 1
 _NUMBER = r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 _FLOAT, _WHOLE = re.compile(_NUMBER), re.compile(r"[+-]?[0-9]{1,18}")
 _LENGTH = re.compile(_NUMBER + r"\s*(?P<unit>[^\W\d][^\s]*)?(?=\s|$)")
+_IN_RECORD = re.compile(r"^ +reading: .*\n", re.MULTILINE)
 _QUANTITY = re.compile(_NUMBER + r"\s*(?P<unit>(?!\.|[eE]\d)\D.*)", re.ASCII)
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -116,7 +117,15 @@ def read_first(function: Function) -> Function:
 
     plain = [each.plain for each in parameters_of(function).values()]
     vars(call)["__signature__"] = stated.replace(parameters=plain)
+    if "reading" in stated.parameters:
+        (record,) = get_args(stated.parameters["reading"].annotation)
+        call.__doc__ = _IN_RECORD.sub(_list_arguments(record).replace("\\", r"\\"), function.__doc__ or "")
     return cast("Function", call)
+
+
+def _list_arguments(record: type) -> str:
+    """Return the lines in which a record of keywords says what they are, as they stand below Args."""
+    return "\n".join(f"    {line}" for line in cleandoc(record.__doc__ or "").partition("Args:\n")[2].splitlines()) + "\n"
 
 
 def read_arguments(function: Callable[..., Any], arguments: Mapping[str, Any], typed: bool = False) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from bowdenfit.cable.registry import check_names
 from bowdenfit.description import Description
 from bowdenfit.description.file import override
 from bowdenfit.display import Display, Rows
-from bowdenfit.errors import DescriptionError, Faults
+from bowdenfit.errors import DescriptionError, Faults, MissingAngleError
 from bowdenfit.files import is_ros2_folder
 from bowdenfit.files.headings import parse_sources
 from bowdenfit.files.isolation import limits_times
@@ -187,7 +187,7 @@ def single_file_dataset(
     if file is not None and file.has_own_angles(wrap_angle is not None):
         angle: dict[str, Any] = {"column": WRAP_ANGLE.name}
     elif wrap_angle is None:
-        raise DescriptionError(
+        raise MissingAngleError(
             f"{path.name} is a file without a description; give the angle that the cable was wrapped by, such as --wrap-angle "
             "180deg, or write a cable.toml next to it with `bowdenfit init`; `bowdenfit check` prints the whole command."
         )

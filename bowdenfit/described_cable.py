@@ -4,18 +4,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
+import numpy as np
 import pandas as pd
 
-from bowdenfit.dataset import Dataset, read_dataset
+from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
+from bowdenfit.description import SCHEMA
+from bowdenfit.description.toml_text import format_toml
 from bowdenfit.display import Display, Rows
-from bowdenfit.errors import UsageError, suggest_name
+from bowdenfit.errors import UsageError, disk_error, suggest_name
 from bowdenfit.frames import Frame, is_frame, write_frame
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.outputs import write_text
 from bowdenfit.words import listed, shown
 
+CurveName: TypeAlias = Literal["gaussian", "line", "logistic", "smooth"]  # those of the registry, which a test compares
 _SOURCE = "the cable"  # what refusals call the description
 
 
@@ -27,7 +32,7 @@ class Contact:
         name: Name of the contact, such as "free sheath".
         friction: Name of its coefficient, such as "mu1"; contacts may share one.
         wrap_angle: Its wrap angle where that is the same all along the route, with the unit, such as (45, "deg").
-        curve: Name of the curve that its wrap angle follows along the route, such as "gaussian".
+        curve: Curve that its wrap angle follows along the route, such as "gaussian".
         column: Column of its wrap angles in the tables; by its name if omitted.
         settings: Further keys of `wrap_angle` in cable.toml, such as {"published_range": (450, 530)}.
     """
@@ -35,7 +40,7 @@ class Contact:
     name: str
     friction: str
     wrap_angle: tuple[float, str] | None = None
-    curve: str | None = None
+    curve: CurveName | None = None
     column: str | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
@@ -96,11 +101,39 @@ class Cable(Display):
         if not tables:
             raise UsageError(f"there are no readings; name at least one table of {listed(_KINDS)}.")
         with TemporaryDirectory() as folder:
-            files = {kind: _write_table(kind, table, Path(folder)).name for kind, table in tables.items()}
-            stated = self._stated.get("tables", {})
-            unknown = {kind: settings for kind, settings in stated.items() if kind not in KINDS}  # which are refused by name
-            with_files = unknown | {kind: {**stated.get(kind, {}), "file": file} for kind, file in files.items()}
-            return read_dataset(parse_description({**self._stated, "tables": with_files}, _SOURCE), Path(folder), {})
+            return read_dataset(parse_description(self._write_tables(tables, Path(folder)), _SOURCE), Path(folder), {})
+
+    def write(self, folder: str | Path, **tables: "Frame | Mapping[str, Any]") -> Path:
+        """Write this cable and its readings as a data set, a folder with cable.toml and tables, and return the folder.
+
+        Args:
+            folder: The new folder.
+            tables: See `read`.
+
+        Raises:
+            UsageError, DescriptionError, DatasetError: See `read`; or there is such a folder.
+            StoreError: It cannot be written.
+        """
+        self.read(**tables)  # which refuses before anything is written
+        place = Path(folder)
+        try:
+            place.mkdir(parents=True)
+            page = self._write_tables(tables, place)
+            ordered = dict(sorted(page.items(), key=lambda item: _place_in_toml(item[1])))
+            write_text(place / DESCRIPTION_FILE, format_toml({"schema": SCHEMA, **ordered}, {}))
+        except FileExistsError:
+            raise UsageError(f"{place} exists already; name a folder that does not.") from None
+        except OSError as error:
+            raise disk_error(place, error) from None
+        return place
+
+    def _write_tables(self, tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+        """Write tables into a folder, and return the description that names them."""
+        files = {kind: _write_table(kind, table, folder).name for kind, table in tables.items()}
+        stated = self._stated.get("tables", {})
+        unknown = {kind: settings for kind, settings in stated.items() if kind not in KINDS}  # which are refused by name
+        with_files = unknown | {kind: {**stated.get(kind, {}), "file": file} for kind, file in files.items()}
+        return {**self._stated, "tables": with_files}
 
     def sentences(self) -> list[str]:
         """Return the name and the contacts."""
@@ -135,8 +168,16 @@ def _write_table(kind: str, table: Any, folder: Path) -> Path:
     return write_frame(table, folder, f"{kind}.csv")
 
 
+def _place_in_toml(value: Any) -> int:
+    """Return where a key comes: plain values before tables, and lists of tables last."""
+    is_list = isinstance(value, list) and any(isinstance(item, Mapping) for item in value)
+    return 2 if is_list else int(isinstance(value, Mapping))
+
+
 def _plain(value: Any) -> Any:
     """Return settings with lists in the place of tuples, as TOML has them."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

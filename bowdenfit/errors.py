@@ -49,6 +49,10 @@ class DescriptionError(BowdenfitError):
     exit_code = 2
 
 
+class MissingAngleError(DescriptionError):
+    """A table or recording without a description does not say by which angle the cable was wrapped."""
+
+
 class UsageError(BowdenfitError):
     """The request itself cannot be met: an option with an impossible value, or a question the fit cannot answer."""
 

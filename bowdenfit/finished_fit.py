@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from bowdenfit.arguments import Quantity, number_with_unit
 from bowdenfit.display import Block, Rows, blocks_of
 from bowdenfit.errors import UsageError, suggest_name
+from bowdenfit.questions import identify
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
 from bowdenfit.questions.bends.words import elastic_blocks
 from bowdenfit.questions.check.answer import Checks, check_readings
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from xarray import DataTree
 
     from bowdenfit.plots.layout import Axes, Figure
+    from bowdenfit.questions.identify.likelihood import LikelihoodContour, ProfileLikelihood
 import numpy as np
 
 from bowdenfit.questions.predict.lengths import predict_at_lengths
@@ -129,6 +131,22 @@ class Fit(Record):
             UsageError: The fit has no draws.
         """
         return self.posterior.to_frame()[[p.name for p in self.model.space.free]].corr()
+
+    def profile(self, name: str) -> "ProfileLikelihood":
+        """Return how -2 log L rises along one parameter, all others fitted again; its `plot()` is the figure.
+
+        Raises:
+            UsageError: There is no such free parameter, or it is a scale of noise.
+        """
+        return identify.profile_parameter(self, name)
+
+    def contour(self, first: str, second: str) -> "LikelihoodContour":
+        """Return how -2 log L rises over two parameters, all others fitted again; its `plot()` is the figure.
+
+        Raises:
+            UsageError: There is no such free parameter, one is a scale of noise, or both are the same.
+        """
+        return identify.contour_parameters(self, first, second)
 
     def summary(self) -> Summary:
         """Return everything on one page, for programs (the contents of summary.json)."""

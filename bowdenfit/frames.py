@@ -17,7 +17,8 @@ _NAMED = re.compile(rf"(?<![\w'\"-])--column (\w[\w.]*=(?:'[^']*'|[^\s,;]*[^\s,;
 _CODE = re.compile(rf"(?<![\w'\"-])--missing ([^\s,;]*[^\s,;.]){_TOML}")
 _ANGLE = re.compile(r"(?<![\w'\"-])--wrap-angle (\d[^\s,;]*[^\s,;.])")
 _OF_FILES = ", or write a cable.toml next to it with `bowdenfit init`; `bowdenfit check` prints the whole command"
-_KEYWORDS = {"--column": "columns", "--missing": "missing", "--wrap-angle": "wrap_angle", "--reading-limit": "reading_limit"}
+_KEYWORDS = {"--column": "columns", "--missing": "missing", "--wrap-angle": "wrap_angle", "--reading-limit": "reading_limit",
+             "--set": "settings"}  # fmt: skip
 
 
 class Frame(Protocol):
@@ -91,6 +92,11 @@ def say_keywords(sentence: str) -> str:
     for option, keyword in _KEYWORDS.items():
         sentence = re.sub(rf"(?<![\w'\"-]){option}\b", keyword, sentence)
     return sentence
+
+
+def keyword_of(option: str) -> str:
+    """Return the keyword of Python for an option of the command line, such as "columns" for "--column"."""
+    return _KEYWORDS.get(option, option.removeprefix("--").replace("-", "_"))
 
 
 def _unquoted(argument: str) -> str:

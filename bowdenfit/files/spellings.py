@@ -26,7 +26,8 @@ _NAMES = {
     "direccion|carrera|direzione|corsa",
     "velocity": "speed|geschwindigkeit|seilgeschwindigkeit|drehzahl|motordrehzahl|vitesse|velocidad|velocita|cable speed|"
     "rope speed|motor speed|motor velocity|cable velocity",
-    "run": "run no|run nr|run number|run id|mounting|mounting no|mounting number|montage|montaje|montaggio",
+    "run": "run no|run nr|run number|run id|mounting|mounting no|mounting number|montage|montaje|montaggio|lauf|"
+    "lauf nr|laufnummer",
     "wrap_angle": "wrapping angle|angle of wrap|total wrap angle|umschlingungswinkel|umschlingung|angle d enroulement|"
     "angle d embrassement|angulo de abrazamiento|angulo de abrazo|angolo di avvolgimento",
     "efficiency": "wirkungsgrad|ubertragungswirkungsgrad|rendement|rendimiento|eficiencia|rendimento|efficienza|eta|eff|"

@@ -11,6 +11,7 @@ from bowdenfit.description import MOST_FILES, Description
 from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
 from bowdenfit.files.columns import Column, Quantity, find_columns
 from bowdenfit.files.excluded_rows import leave_out_rows
+from bowdenfit.files.formats import WORKBOOKS
 from bowdenfit.files.merged_cells import fill_merged_cells
 from bowdenfit.files.missing_codes import MissingCodes, leave_out_coded_rows
 from bowdenfit.files.row_account import BY_USER, RowAccount
@@ -78,10 +79,17 @@ class Source:
             raise DatasetError(f"the table {self.kind} must be one file; cable.toml names {len(paths)}.")
         return paths[0]
 
-    @property
-    def sheets(self) -> tuple[str, ...]:
-        """Titles of the sheets that are read of each workbook; one that is empty where none is stated."""
-        titles = self.settings.sheet
+    def sheets_of(self, path: Path) -> tuple[str, ...]:
+        """Return the titles of the sheets that are read of a file; one that is empty where none is stated.
+
+        Of files of which some are workbooks, the others have no sheets.
+
+        Args:
+            path: The file.
+        """
+        titles, is_workbook = self.settings.sheet, path.suffix.lower() in WORKBOOKS
+        if not is_workbook and any(file.suffix.lower() in WORKBOOKS for file in self.files):
+            return ("",)
         return (titles,) if isinstance(titles, str) else titles or ("",)
 
     @property
@@ -104,9 +112,9 @@ class Source:
             DatasetError: See `read_table`; or every row holds a code, or several sheets are stated.
         """
         if sheet is None:
-            sheet, *more = self.sheets
+            sheet, *more = self.sheets_of(path)
             if more:
-                raise DatasetError(f"the table {self.kind} must be on one sheet; cable.toml names {len(self.sheets)}.")
+                raise DatasetError(f"the table {self.kind} must be on one sheet; cable.toml names {len(more) + 1}.")
         codes = MissingCodes(self.settings.missing)
         table = codes.mark(read_table(path, sheet=sheet))
         table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)

@@ -134,7 +134,8 @@
       const named = chart.names.length > 0, counts = data[0].every(Number.isInteger);
       const picked = chart.groups.some(group => group.series.some(one => one.keys));
       this.ends = named ? [0.5, chart.names.length + 0.5] : [data[0][0], data[0].at(-1)];
-      if (picked) this.ends = padded(...this.ends); // no point lies on the edge
+      const dotted = chart.groups.some(group => group.series.some(one => ["points", "hollow"].includes(one.look)));
+      if (dotted && !named) this.ends = padded(...this.ends); // no point lies on the edge
       const axis = label => ({ label, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid }, font: font(), labelFont: font() });
       const bands = series.flatMap((one, i) => one.look === "low" ? [{ series: [i + 2, i + 1], fill: color(one.color) + Math.round(255 * BAND).toString(16) }] : []);
       this.addKey(chart, series);
@@ -153,7 +154,7 @@
           setScale: [(plot, name) => { if (name === "x") this.box.dataset.shown = `${plot.scales.x.min} ${plot.scales.x.max}`; }],
         },
       }, data, this.area);
-      if (named || picked) this.whole();
+      if (named || dotted) this.whole();
       if (picked) this.plot.over.addEventListener("click", event => this.pick(event, chart));
     }
 

@@ -47,6 +47,8 @@ def fit(
 ) -> "Fit":
     """Fit a data set: least squares, then the posterior, then the design answer. Nothing is written unless `output` says where.
 
+    Example: fit = bf.fit(frame, wrap_angle="180deg", settings=["friction.mu.fixed=0.1"], seed=1, output="fits/bench")
+
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
         output: Results folder.

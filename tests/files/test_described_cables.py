@@ -1,11 +1,15 @@
 """Cables described in Python are those of a folder with the same words and numbers; what is wrong is said in a sentence."""
 
+from typing import get_args
+
 import numpy as np
 import pandas as pd
 import pytest
 from conftest import ROOT
 
 import bowdenfit as bf
+from bowdenfit.cable.registry import CURVES
+from bowdenfit.described_cable import CurveName
 
 ON_BODY = ROOT / "datasets" / "on-body-exoskeleton"
 LIMIT = {"angles": {"detection_limit": {"value": 10, "unit": "deg"}}}
@@ -36,6 +40,23 @@ def test_readings_are_those_of_a_folder():
     for first, other in zip(data.measurements.tables, same.measurements.tables, strict=True):
         np.testing.assert_equal(arrays_of(first), arrays_of(other))
     assert data.description.contact == same.description.contact
+
+
+def test_a_cable_that_was_written_is_read_as_it_was_described(tmp_path):
+    cable, tables = on_body(noise="student"), {"angles": table("angles"), "efficiencies": table("efficiencies")}
+    data, written = cable.read(**tables), bf.read(cable.write(tmp_path / "new" / "cable", **tables))
+    for first, other in zip(data.measurements.tables, written.measurements.tables, strict=True):
+        np.testing.assert_equal(arrays_of(first), arrays_of(other))
+    assert written.description == data.description
+    with pytest.raises(bf.UsageError, match="exists already"):
+        cable.write(tmp_path / "new" / "cable", **tables)
+    with pytest.raises(bf.UsageError, match="no table 'angle'"):
+        cable.write(tmp_path / "other", angle=table("angles"))
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_contact_declares_the_curves_that_there_are():
+    assert get_args(CurveName) == tuple(CURVES)
 
 
 def test_arrays_by_heading_are_a_table():

@@ -1,5 +1,7 @@
 """Data frames in place of files: the same data set, whichever library they are of, and a sentence for what is none."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -86,3 +88,21 @@ def test_a_refused_frame_names_keywords_of_python_and_no_options(columns, keywor
     with pytest.raises(BowdenfitError, match=words) as refusal:
         bf.read(pd.DataFrame(columns), **keywords)
     assert "--" not in str(refusal.value) and "cable.toml" not in str(refusal.value)
+
+
+def test_check_asks_no_more_of_a_frame_than_the_command_does_of_its_file(frame):
+    frame["fish"] = np.repeat([1, 2, 3], 4)
+    report = bf.check(frame.rename(columns={"input force (N)": "F1", "output force (N)": "F2"}))
+    assert "the data frame: a table of 12" in str(report)
+    call = re.search(r"bf\.fit\(frame, .*\)", str(report))[0]
+    assert "wrap_angle='180deg'" in call
+    assert "columns=['input_force=F1:N', 'output_force=F2:N']" in call
+    assert bf.check(frame, wrap_angle=ANGLE).description.name
+    with pytest.raises(BowdenfitError, match="fish"):
+        bf.check(frame, columns=["input_force=fish:m"])
+
+
+def test_help_lists_every_keyword_of_reading():
+    for verb in (bf.fit, bf.check, bf.read, bf.model):
+        assert "wrap_angle: Wrap angle of a single table" in verb.__doc__, verb
+    assert "Example:" in bf.fit.__doc__

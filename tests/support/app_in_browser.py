@@ -17,9 +17,21 @@ _ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one fo
 PATIENCE = 60_000  # ms; a machine with other work on it loads JAX slowly
 
 
+_SHELL_WORDS = r"""() => {
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
+  while (texts.nextNode()) {
+    const words = texts.currentNode.data, element = texts.currentNode.parentElement;
+    if (element.closest("script, style, .equivalent, .toml")) continue;
+    if (/\bbowdenfit [a-z]|Ctrl-C|terminal|(^|[\s(])--[a-z]/.test(words)) found.push(`of a shell: ${words.slice(0, 80)}`);
+  }
+  return found;
+}"""
+
+
 def faults_of(page):
-    """What is wrong with a page: contrast, names of controls, headings, width."""
-    return [fault for fault in page.evaluate(FAULTS) if not fault.startswith(_ALLOWED)]
+    """What is wrong with a page: contrast, names of controls, headings, width, and words that only a shell understands."""
+    faults = [fault for fault in page.evaluate(FAULTS) if not fault.startswith(_ALLOWED)]
+    return faults + page.evaluate(_SHELL_WORDS)
 
 
 class Served:

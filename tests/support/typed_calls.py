@@ -37,6 +37,8 @@ def accepted(fit: bf.Fit) -> None:
     cable = bf.Cable("my cable", contacts, friction_model="load-dependent")
     data = cable.read(forces={"input force (N)": [20, 40], "output force (N)": np.array([17.2, 34.1])})
     bf.fit(data, seed=1)
+    cable.write("my-cable", forces={"input force (N)": [20, 40], "output force (N)": [17.2, 34.1]})
+    fit.profile("mu1").plot()
     bf.model(data).log_likelihood({"mu": 0.1})
     bf.report(fit, "report.html", compare="fits/before")
     fit.correlation().round(2)
@@ -54,6 +56,7 @@ def wrong(fit: bf.Fit) -> None:
     bf.read("my-cable", wrap_angle=180)  # refused
     bf.fit("my-cable", seed="1")  # refused
     bf.fit(123)  # refused
+    bf.Contact("sheath", "mu", curve="gausian")  # refused
     bf.plot(fit, width=3.5)  # refused
     fit.plot.efficiency(figsize=7)  # refused
     fit.plot.efficiency(ax="left")  # refused

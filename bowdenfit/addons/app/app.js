@@ -13,6 +13,16 @@
     }
     return refusals;
   };
+  globalThis.copyText = async button => {
+    const words = button.parentElement.querySelector("pre").textContent;
+    try {
+      await navigator.clipboard.writeText(words);
+      button.textContent = "Copied";
+    } catch {
+      button.textContent = "Select it, and copy it by hand";
+    }
+    setTimeout(() => { button.textContent = "Copy"; }, 2000);
+  };
   // A point of a chart that is clicked shows its row; both have the same key.
   document.addEventListener("pick", event => {
     const row = document.querySelector(`[data-row-key="${CSS.escape(event.detail)}"]`);
@@ -27,6 +37,7 @@
   document.addEventListener("focusin", event => { last = event.target.dataset?.key ?? null; });
   const tidy = () => {
     globalThis.drawCharts?.();
+    document.querySelector("main.q-page")?.setAttribute("role", "none"); // NiceGUI's own, around ours
     if (last && document.activeElement === document.body) document.querySelector(`[data-key="${CSS.escape(last)}"]`)?.focus({ preventScroll: true });
   };
   const start = () => { new MutationObserver(tidy).observe(document.body, { childList: true, subtree: true }); tidy(); };

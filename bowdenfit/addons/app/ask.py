@@ -14,7 +14,9 @@ from nicegui import ui
 import bowdenfit as bf
 from bowdenfit.addons.app.add_rows import show_table_links
 from bowdenfit.addons.app.elements import VALUE_AT_FIRST, address, block, button, choice, field, link, markup, text
+from bowdenfit.addons.app.equivalent_command import EquivalentCommand, show_command, write_command
 from bowdenfit.addons.app.frame import refused, section
+from bowdenfit.addons.app.page_words import page_html
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.display import blocks_of, render_html
 from bowdenfit.errors import BowdenfitError
@@ -22,7 +24,12 @@ from bowdenfit.pages.page import render_section
 from bowdenfit.pages.section import PageSection
 from bowdenfit.questions import export as export_room
 from bowdenfit.questions import next as next_room
+from bowdenfit.questions.export.verb import VERB as EXPORT
 from bowdenfit.questions.export.verb import Target, export
+from bowdenfit.questions.next.verb import VERB as NEXT
+from bowdenfit.questions.predict.verb import VERB as PREDICT
+from bowdenfit.questions.predict.verb import predict
+from bowdenfit.questions.report.verb import VERB as REPORT_VERB
 from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY
 from bowdenfit.words import capitalized
 
@@ -42,10 +49,11 @@ class ArrivingForce:
     Args:
         workbench: Which works it out.
         fit: The fit.
+        name: Name of the fit.
     """
 
-    def __init__(self, workbench: Workbench, fit: "Fit") -> None:
-        self._workbench, self._fit = workbench, fit
+    def __init__(self, workbench: Workbench, fit: "Fit", name: str) -> None:
+        self._workbench, self._fit, self._results = workbench, fit, workbench.results(name)
         self._dials = import_module("bowdenfit.addons.app.dials")  # which loads JAX
         self._values: dict[str, float] = {}
         self._way, self._stroke = "in", "pull"
@@ -64,6 +72,7 @@ class ArrivingForce:
                 choice("dial-stroke", self._stroke, _STROKES, self._choose_stroke)
         with block("div", role="status", aria_live="polite"):
             self._place = markup("", "div", "arrives", id="arrives")
+        self._command = show_command(PREDICT, {"fit": self._results}, self._workbench.folder, key="predict-command")
         ui.timer(0.05, self._answer, once=True)
 
     def _show_dial(self, dial: "Dial", key: str) -> None:
@@ -98,24 +107,25 @@ class ArrivingForce:
         try:
             while answered != self._asked:
                 answered = self._asked
-                question = partial(self._dials.answer_dials, self._fit, dict(self._values), self._way == "in", self._stroke)
+                request = self._dials.request_dials(self._fit, self._values, self._way == "in", self._stroke)
                 try:
-                    words = render_html(blocks_of(await self._workbench.compute(question)))
+                    words = render_html(blocks_of(await self._workbench.compute(partial(predict, self._fit, **request))))
                 except BowdenfitError as error:
                     words = render_html([str(error)])
-                self._place.set_content(words)
+                self._place.set_content(page_html(words))
+                self._command.show(write_command(PREDICT, {"fit": self._results, **request}, self._workbench.folder))
                 await asyncio.sleep(0)
         finally:
             self._busy = False
 
 
-def show_arriving(workbench: Workbench, fit: "Fit") -> None:
+def show_arriving(workbench: Workbench, fit: "Fit", name: str) -> None:
     """Show what arrives at a length or bend, of a fit with draws."""
     with section(ARRIVES, "arriving"):
         if fit.sampled is None:
             text("This fit has no posterior, because it was made without MCMC; fit again for intervals.")
         else:
-            ArrivingForce(workbench, fit).show()
+            ArrivingForce(workbench, fit, name).show()
 
 
 def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
@@ -133,7 +143,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
             text("Ranking what could be measured ...")
         try:
             ranking = await workbench.compute(bf.next_measurement, fit)
-            words = render_section(_stop_first(next_room.ranking_section(ranking), ranking.stop), {})
+            words = page_html(render_section(_stop_first(next_room.ranking_section(ranking), ranking.stop), {}))
         except BowdenfitError as error:
             place.clear()
             with place:
@@ -147,6 +157,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
     with section(STOP, "next"):
         with block("div", role="status") as place:
             button("Rank what could be measured next", rank)
+        show_command(NEXT, {"fit": workbench.results(name)}, workbench.folder, key="next-command")
         if data_set:
             text("Once it was measured, type it in, or let the app see the file:")
             with block("div", "row"):
@@ -162,8 +173,9 @@ def _stop_first(advice: PageSection, stop: str) -> PageSection:
     return replace(advice, context={**advice.context, "headline": stop, "sentences": remaining})
 
 
-def show_files(name: str) -> None:
+def show_files(workbench: Workbench, name: str) -> None:
     """Show links to the report, to the data of a fit, and to what other programs read of it."""
+    folder = workbench.results(name)
     kept = (
         ("Report", REPORT), ("Everything it says", DETAILS_TEXT), (SUMMARY, SUMMARY), (f"Draws, {POSTERIOR}", POSTERIOR),
     )  # fmt: skip
@@ -172,6 +184,8 @@ def show_files(name: str) -> None:
         text("For other programs:")
         formats = export_room.load_formats().items()
         _show_links([(capitalized(of.words), address("export", name, target)) for target, of in formats])
+        commands = [write_command(EXPORT, {"fit": folder, "to": target}, workbench.folder) for target, _ in formats]
+        EquivalentCommand([write_command(REPORT_VERB, {"fit": folder}, workbench.folder), *commands], f"In {workbench.folder}:")
 
 
 def _show_links(links: Sequence[tuple[str, str]]) -> None:

@@ -1,5 +1,6 @@
 """Pages on which measurements are brought: the start, and the files of a new data set."""
 
+import shlex
 from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
@@ -22,6 +23,7 @@ from bowdenfit.addons.app.elements import (
     text,
     text_input,
 )
+from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import NAME, attempt, frame, notify, refused, section
 from bowdenfit.addons.app.history import read_past_fit, show_past_fit
 from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
@@ -156,6 +158,10 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
         place = block("div")
 
     async def look_again() -> None:
+        if draft.files and not (draft.is_arriving or draft.understanding.files):
+            place.clear()
+            with place:
+                text("Reading the files ...", role="status")
         understanding = Understanding() if draft.is_arriving else await workbench.compute(draft.understand)
         place.clear()
         with place:
@@ -199,41 +205,76 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
 
 
 async def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
-    """Show what is understood of a draft, and what is asked."""
+    """Show what is understood of a draft in steps: what was read, what is asked, and what it means."""
     if not (draft.files or draft.is_described):
         text("Nothing is here yet.")
         return
+    _show_steps(understanding)
+    with section("What was read", "read"):
+        _show_refusals(understanding.refusals)
+        _show_files(draft, understanding, look_again)
+    _show_questions(draft, understanding, look_again)
+    if not understanding.description:
+        return
+    with section("What it means", "understood"):
+        if understanding.checked is not None:
+            show_checked(understanding.checked)
+        place = block("div")
+        with block("details"):
+            text("The cable.toml that is written", "summary")
+            text(understanding.description, "pre", "toml", tabindex="0")
+    if understanding.checked is not None:
+        _show_writing(workbench, draft)
+    with place:
+        await MeasuredView(workbench, draft.folder).show(understanding.refusals)
+
+
+def _show_steps(understanding: Understanding) -> None:
+    """Show how far it is, with links to each step."""
+    unanswered = sum(not entry.answer or bool(entry.fault) for entry in understanding.entries)
+    warnings = len(understanding.checked.warnings) if understanding.checked is not None else 0
+    faults = len(understanding.refusals)
+    steps = [("read", "What was read", "cannot be used yet" if faults else "done", "bad" if faults else "good")]
+    if understanding.entries:
+        words = f"{counted(unanswered, 'answer')} missing" if unanswered else "answered; look at what is proposed"
+        steps.append(("questions", "What is asked", words, "bad" if unanswered else "good"))
+    if understanding.checked is not None:
+        steps.append(("understood", "What it means", counted(warnings, "warning") if warnings else "nothing is wrong",
+                      "doubtful" if warnings else "good"))  # fmt: skip
+        steps.append(("keep", "Keep it", "", "good"))
+    with block("nav", aria_label="Steps"), block("ol", "steps"):
+        for key, words, state, kind in steps:
+            with block("li"):
+                link(words, f"#{key}")
+                if state:
+                    text(state, "span", f"state {kind}")
+
+
+def _show_files(draft: Draft, understanding: Understanding, look_again: Again) -> None:
+    """Show the files of a draft: what each holds at once, its columns when it is opened."""
     if draft.is_described:
         with block("div", "row"):
             text(DESCRIPTION_FILE, "h3")
             _remove_button(draft, DESCRIPTION_FILE, look_again)
-    for file in understanding.files:
-        _show_file(draft, file, look_again)
-        if not understanding.description and (sketch := sketch_file(file)) is not None:
-            markup(render_section(prose_section("", (), pictures=(sketch,)), {}), "div")
-    for path in [path for path in draft.files if path.name not in {file.name for file in understanding.files}]:
+    faults = " ".join(refusal.sentence for refusal in understanding.refusals)
+    for number, file in enumerate(understanding.files):
+        with block("details") as part:
+            holds = f": {file.holds}" if file.holds else ""
+            text(f"{file.name}{holds}", "summary", dir="auto")
+            with block("div", "one-file"):
+                _show_file(draft, file, look_again)
+                if not understanding.description and (sketch := sketch_file(file, number)) is not None:
+                    markup(render_section(prose_section("", (), pictures=(sketch,)), {}), "div")
+        if len(understanding.files) == 1 or file.name in faults:
+            part.props["open"] = True
+    known = {file.path.name for file in understanding.files}
+    for path in [path for path in draft.files if path.name not in known]:
         with block("div", "row"):
             text(path.relative_to(draft.folder).as_posix(), "h3", dir="auto")
             _remove_button(draft, path.name, look_again)
-    _show_refusals(understanding.refusals)
-    _show_questions(draft, understanding, look_again)
-    if understanding.description:
-        with block("details"):
-            text("The cable.toml that is written", "summary")
-            text(understanding.description, "pre", tabindex="0")
     if understanding.left_out:
         names = listed([shown(name) for name in understanding.left_out])
         text(f"Left out, because the contents are not what the extension says: {names}.", classes="hint")
-    if understanding.checked is not None:
-        with section("How it was read", "understood"):
-            show_checked(understanding.checked)
-    if understanding.description:
-        with section("What was measured", "measured"):
-            place = block("div")
-        if understanding.checked is not None:
-            _show_writing(workbench, draft)
-        with place:
-            await MeasuredView(workbench, draft.folder).show(understanding.refusals)
 
 
 def _remove_button(draft: Draft, name: str, look_again: Again) -> None:
@@ -248,12 +289,9 @@ def _remove_button(draft: Draft, name: str, look_again: Again) -> None:
 
 def _show_file(draft: Draft, file: MeasuredFile, look_again: Again) -> None:
     """Show the columns of a file, whose meanings and units can be changed."""
-    with block("section"):
+    with block("div"):
         with block("div", "row"):
-            text(file.name, "h3", dir="auto")
             _remove_button(draft, file.path.name, look_again)
-        if file.holds:
-            text(f"It holds {file.holds}.")
         with block("div", "wide", role="region", tabindex="0", aria_label=f"Columns of {file.name}"), block("table", "columns"):
             with block("thead"), block("tr"):
                 for head in _HEADS:
@@ -320,7 +358,7 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
         draft.answers[key] = typed
         await look_again()
 
-    with section("What the files do not state", "questions"):
+    with section("What the files do not state", "questions"), block("div", "questions"):
         with block("figure", "bench-figure"):
             markup(_BENCH, "div")
             text(_BENCH_WORDS, "figcaption")
@@ -345,8 +383,20 @@ def _show_writing(workbench: Workbench, draft: Draft) -> None:
         draft.write(workbench.folder / name["folder"])
         ui.navigate.to(address("data", name["folder"]))
 
+    def show_init() -> None:
+        files = [path.name for path in draft.files]
+        command.show(shlex.join(["bowdenfit", "init", name["folder"], "--from", *files]))
+
+    def take_name(typed: str) -> None:
+        name["folder"] = typed
+        if not draft.is_described:
+            show_init()
+
     with section("Keep it", "keep"):
         with field("Name of the folder with cable.toml", "folder", f"It is written into {workbench.folder}."):
-            text_input("folder", name["folder"], lambda typed: name.update(folder=typed))
+            text_input("folder", name["folder"], take_name)
         with block("div", "row"):
             button("Write the data set", lambda: attempt(write), "primary")
+        if not draft.is_described:
+            command = EquivalentCommand([""], "In the folder of the files; it asks the same questions:", key="init-command")
+            show_init()

@@ -7,6 +7,7 @@ from bowdenfit.addons.app import angle_charts, friction_charts, recording_charts
 from bowdenfit.addons.app.measured_rows import MeasuredRows, UnusedRow
 from bowdenfit.addons.app.points import COLORS, Drawers, Points, make_chart
 from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.lone_file import FileColumn
 from bowdenfit.pages.section import Chart, Picture, SeriesGroup
 from bowdenfit.questions.start.measured_file import MeasuredFile
 from bowdenfit.words import counted
@@ -49,11 +50,18 @@ def _caption(charts: Sequence[Chart], unused: Sequence[UnusedRow]) -> str:
     return " ".join([*sentences, "Click a point to see its row below."] if has_rows else sentences)
 
 
-def sketch_file(file: MeasuredFile) -> Picture | None:
+def _label(column: FileColumn) -> str:
+    """Return the heading of a column with its unit, which the heading may have already."""
+    has_unit = not column.unit or f"({column.unit})" in column.name or f"[{column.unit}]" in column.name
+    return column.name if has_unit else f"{column.name} ({column.unit})"
+
+
+def sketch_file(file: MeasuredFile, number: int = 0) -> Picture | None:
     """Return the numbers of a file against each other, as written, while it is not known yet what all of them are.
 
     Args:
         file: A file on its way to a data set.
+        number: Its number among those of a page.
     """
     columns = [column for column in file.columns if column.numbers and not column.is_clock and len(column.finite) > 1]
     meanings = {file.meaning_of(column): column for column in columns}
@@ -61,7 +69,7 @@ def sketch_file(file: MeasuredFile) -> Picture | None:
     if len(columns) < 2:
         return None
     first, *upward = forces if len(forces) == 2 else columns
-    labels = {column.name: f"{column.name} ({column.unit})" if column.unit else column.name for column in columns}
+    labels = {column.name: _label(column) for column in columns}
     points = [
         Points(labels[column.name], color, "points", first.values, column.values)
         for column, color in zip(upward, COLORS, strict=False)
@@ -70,4 +78,4 @@ def sketch_file(file: MeasuredFile) -> Picture | None:
     y_label = labels[upward[0].name] if len(upward) == 1 else f"({units[0]})" if len(units) == 1 and units[0] else "As written"
     chart = make_chart(file.name, labels[first.name], y_label, points)
     caption = "As written in the file; what is not answered yet is not applied."
-    return Picture("sketch", file.name, "", (chart,), caption, alone=True)
+    return Picture(f"sketch-{number}", file.name, "", (chart,), caption, alone=True)

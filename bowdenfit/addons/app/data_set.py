@@ -1,19 +1,24 @@
 """The page of a data set: what was measured, how `check` understands it, and the button that fits it."""
 
+from contextlib import suppress
+
 from nicegui import ui
 
 from bowdenfit.addons.app.add_rows import show_table_links
 from bowdenfit.addons.app.description_edit import exclude_row, include_row
 from bowdenfit.addons.app.draft import list_refusals
 from bowdenfit.addons.app.elements import address, block, button, field, link, text, text_input
+from bowdenfit.addons.app.equivalent_command import EquivalentCommand, show_command, write_command
+from bowdenfit.addons.app.fit_job import FitRequest
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.history import show_history
 from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
 from bowdenfit.errors import BowdenfitError, UsageError
-from bowdenfit.questions.check.verb import check
-from bowdenfit.run.verb import fit as fit_verb
+from bowdenfit.questions.check import check_data_set
+from bowdenfit.questions.check.verb import VERB as CHECK
+from bowdenfit.run.verb import VERB as FIT
 
 
 def read_seed(typed: str) -> int | None:
@@ -25,7 +30,7 @@ def read_seed(typed: str) -> int | None:
     Raises:
         UsageError: It is not a whole number, is negative, or is too large.
     """
-    seed: int | None = read_arguments(fit_verb, {"seed": typed.strip() or None}, typed=True)["seed"]
+    seed: int | None = read_arguments(FIT.function, {"seed": typed.strip() or None}, typed=True)["seed"]
     return seed
 
 
@@ -35,10 +40,13 @@ class DataSetPage:
     Args:
         workbench: Where it lies.
         name: Name of the data set.
+
+    Raises:
+        UsageError: There is no such data set.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:
-        self._workbench, self._name = workbench, name
+        self._workbench, self._name, self._folder = workbench, name, workbench.data_set(name)
         self._fit_name, self._seed = workbench.free_name(name), ""
         with frame(workbench.title_of(name)):
             with section("Fit it", "fit"):
@@ -53,13 +61,17 @@ class DataSetPage:
                         text_input("fit-name", self._fit_name, self._state_name)
                     self._seed_place = block("div")
                     self._show_seed()
+                self._command = EquivalentCommand([""], f"In {workbench.folder}:", key="fit-command")
+                self._show_command()
             with section("Change it", "add"), block("div", "row"):
                 show_table_links(workbench, name)
                 link("Describe the cable", address("describe", name), "button")
+                link("Try by hand", address("try", name), "button")
                 link("Live: fit again after each mounting", address("live", name), "button")
             with section("Fits of it", "history"):
                 history = block("div")
             with section("What was measured", "understood"):
+                show_command(CHECK, {"dataset": self._folder}, workbench.folder, key="check-command")
                 self._place = block("div", aria_live="polite")
         with self._place:
             text("Reading ...")
@@ -71,8 +83,22 @@ class DataSetPage:
         ui.timer(0.05, look_back, once=True)
         ui.timer(0.05, self._look, once=True)
 
+    @property
+    def _request(self) -> FitRequest:
+        """What the button asks for.
+
+        Raises:
+            UsageError: The seed or the name cannot be taken.
+        """
+        return self._workbench.request_fit(self._fit_name, self._name, read_seed(self._seed))
+
+    def _show_command(self) -> None:
+        with suppress(UsageError):
+            self._command.show(write_command(FIT, vars(self._request), self._workbench.folder))
+
     def _state_name(self, typed: str) -> None:
         self._fit_name = typed
+        self._show_command()
 
     def _state_seed(self, typed: str) -> None:
         """Take a seed, or say beside it why it cannot be taken."""
@@ -82,6 +108,7 @@ class DataSetPage:
         except UsageError as error:
             fault = str(error)
         self._show_seed(fault)
+        self._show_command()
 
     def _show_seed(self, fault: str = "") -> None:
         """Show the field of the seed, with why what is typed cannot be taken."""
@@ -100,14 +127,14 @@ class DataSetPage:
         """
         if running := self._workbench.running_fit(self._name):
             raise UsageError(f"the fit {running} of this data set runs already; wait for it, or cancel it.")
-        self._workbench.start_fit(self._fit_name, self._name, read_seed(self._seed))
+        self._workbench.start_fit(self._request)
         ui.navigate.to(address("fit", self._fit_name))
 
     async def _look(self) -> None:
         """Show what `check` says, and what was measured."""
-        folder, report, error = self._workbench.data_set(self._name), None, None
+        folder, report, error = self._folder, None, None
         try:
-            report = await self._workbench.compute(check, folder)
+            report = await self._workbench.compute(check_data_set, folder, {})
         except BowdenfitError as caught:
             error = caught
         self._place.clear()
@@ -124,9 +151,8 @@ class DataSetPage:
         Raises:
             UsageError, DescriptionError, StoreError: cable.toml cannot be changed so.
         """
-        folder = self._workbench.data_set(self._name)
         if reason is None:
-            await self._workbench.compute(include_row, folder, kind, file, row)
+            await self._workbench.compute(include_row, self._folder, kind, file, row)
         else:
-            await self._workbench.compute(exclude_row, folder, kind, file, row, reason)
+            await self._workbench.compute(exclude_row, self._folder, kind, file, row, reason)
         await self._look()

@@ -3,6 +3,7 @@
 import shutil
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,18 +40,32 @@ def exclude_row(folder: Path, kind: str, file: str, row: int, reason: str) -> No
             f"write why row {row} is left out, in {_LONGEST_REASON} characters at most, such as: the rope jumped. It stands in "
             "the report."
         )
+    write_description(folder, tomlkit.dumps(_change_table(folder, kind, partial(_add_row, file, row, words))))
 
-    def change(settings: Any) -> None:
-        entries = settings.setdefault("exclude", tomlkit.array())
-        for entry in entries:
-            if entry["reason"] == words and entry.get("file", file) == file:
-                entry["rows"] = sorted({*entry["rows"], row})
-                return
-        entry = tomlkit.inline_table()
-        entry.update(({} if settings.get("file") == file else {"file": file}) | {"rows": [row], "reason": words})
-        entries.append(entry)
 
-    _change_table(folder, kind, change)
+def preview_exclusion(folder: Path, kind: str, file: str, row: int, reason: str) -> str:
+    """Return the lines of cable.toml with which a row is left out.
+
+    Args:
+        folder, kind, file, row, reason: See `exclude_row`.
+
+    Raises:
+        UsageError: There is no such table.
+    """
+    document = _change_table(folder, kind, partial(_add_row, file, row, " ".join(reason.split())))
+    return tomlkit.dumps({"tables": {kind: {"exclude": document["tables"][kind]["exclude"]}}}).strip()
+
+
+def _add_row(file: str, row: int, reason: str, settings: Any) -> None:
+    """Add a row to those that a table leaves out."""
+    entries = settings.setdefault("exclude", tomlkit.array())
+    for entry in entries:
+        if entry["reason"] == reason and entry.get("file", file) == file:
+            entry["rows"] = sorted({*entry["rows"], row})
+            return
+    entry = tomlkit.inline_table()
+    entry.update(({} if settings.get("file") == file else {"file": file}) | {"rows": [row], "reason": reason})
+    entries.append(entry)
 
 
 def include_row(folder: Path, kind: str, file: str, row: int) -> None:
@@ -76,7 +91,7 @@ def include_row(folder: Path, kind: str, file: str, row: int) -> None:
         if not len(entries):
             settings.pop("exclude", None)
 
-    _change_table(folder, kind, change)
+    write_description(folder, tomlkit.dumps(_change_table(folder, kind, change)))
 
 
 def write_description(folder: Path, text: str) -> None:
@@ -119,8 +134,8 @@ def read_description_text(folder: Path) -> str:
         raise UsageError("cable.toml cannot be read as UTF-8 text; save it as UTF-8, and load this page again.") from None
 
 
-def _change_table(folder: Path, kind: str, change: Callable[[Any], None]) -> None:
-    """Change what a description says of a table."""
+def _change_table(folder: Path, kind: str, change: Callable[[Any], None]) -> Any:
+    """Return a description in which the settings of a table are changed."""
     try:
         document = tomlkit.parse(read_description_text(folder))
         change(document["tables"][kind])
@@ -129,4 +144,4 @@ def _change_table(folder: Path, kind: str, change: Callable[[Any], None]) -> Non
             f"cable.toml has no table {kind} that can be changed here; it was changed by hand, so load this page again, or "
             "edit the file itself."
         ) from None
-    write_description(folder, tomlkit.dumps(document))
+    return document

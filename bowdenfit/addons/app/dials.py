@@ -11,8 +11,6 @@ from bowdenfit.arguments import Stroke
 from bowdenfit.description import ContactSettings
 from bowdenfit.finished_fit import Fit
 from bowdenfit.questions.predict.measured_range import find_measured_range
-from bowdenfit.questions.predict.predictions import Predictions
-from bowdenfit.questions.predict.verb import predict
 from bowdenfit.units import conversion_factor
 
 FORCE = "force"  # key of the dial of the force
@@ -59,8 +57,8 @@ def list_dials(fit: Fit) -> tuple[Dial, ...]:
     return (*places, _dial(FORCE, "Force", "N", 0.0, most, most / _BEYOND / 2))
 
 
-def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: Stroke) -> Predictions:
-    """Return what `bowdenfit predict` says where the dials stand.
+def request_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: Stroke) -> dict[str, Any]:
+    """Return what `predict` is asked of the fit where the dials stand.
 
     Args:
         fit: The fit.
@@ -70,6 +68,7 @@ def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: 
     """
     force = f"{values[FORCE]:g}N"
     request: dict[str, Any] = {"input_force": force} if is_input else {"output_force": force}
+    request["stroke"] = stroke
     places = {key: value for key, value in values.items() if key != FORCE}
     if "length" in places and fit.dataset.description.route is not None:
         request["lengths"] = [places["length"]]
@@ -77,7 +76,7 @@ def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: 
         request |= {"wrap_angles": [f"{places['']:g}deg"]}
     else:
         request |= {"wrap_angles": {name: f"{angle:g}deg" for name, angle in places.items()}}
-    return predict(fit, stroke=stroke, **request)
+    return request
 
 
 def _dial(key: str, label: str, unit: str, low: float, high: float, value: float) -> Dial:

@@ -17,7 +17,7 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.formats import check_ending
 from bowdenfit.files.tables import read_table
 from bowdenfit.outputs import write_text
-from bowdenfit.questions.check.verb import check
+from bowdenfit.questions.check import check_data_set
 from bowdenfit.questions.start.describe import describe_measured_files, inspect_files
 from bowdenfit.questions.start.folder import copy_data_set, refuse_existing, refuse_files, write_data_set
 from bowdenfit.questions.start.measured_file import MeasuredFile
@@ -166,7 +166,7 @@ class Draft:
             if measured_files:
                 description = describe_measured_files(measured_files, _cable_name(measured_files), form)
                 write_text(self.folder / DESCRIPTION_FILE, description)
-                checked = check(self.folder)
+                checked = check_data_set(self.folder, {})
         except UnansweredError:
             pass
         except BowdenfitError as error:
@@ -184,7 +184,7 @@ class Draft:
             refuse_files(self.files)
             self.cable = put_in_place(self.folder).name
             left_out = tuple(path.name for path in self.files if not _is_measured(path))
-            checked = check(self.folder)
+            checked = check_data_set(self.folder, {})
             description = (self.folder / DESCRIPTION_FILE).read_text(encoding="utf-8-sig")
         except BowdenfitError as error:
             refusals = add_cells(list_refusals(error), self.files)

@@ -26,6 +26,7 @@ class FitRequest:
         mcmc: Whether the posterior is sampled.
         resume: Whether an interrupted fit goes on.
         force: Whether an earlier fit in the folder is replaced.
+        settings: Settings that differ from cable.toml, such as "friction.mu1.fixed=0.1".
     """
 
     dataset: Path
@@ -34,6 +35,7 @@ class FitRequest:
     mcmc: bool = True
     resume: bool = False
     force: bool = False
+    settings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the keywords of `bowdenfit.fit`."""

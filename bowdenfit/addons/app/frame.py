@@ -1,5 +1,6 @@
 """The frame of every page: style, scripts, navigation, and what is said where something cannot be done."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -12,9 +13,11 @@ from bowdenfit.addons.app.elements import block, link, session_root, text
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_assets
+from bowdenfit.words import capitalized
 
 _HERE = Path(__file__).parent
 _HEAD = '<link rel="stylesheet" href="{0}/assets/app.css"><script defer src="{0}/assets/app.js"></script>'
+_PLAIN_START = re.compile(r"[a-z]+ ")  # of a sentence: no name of a file or parameter
 NAME = "bowdenfit"
 
 
@@ -66,7 +69,7 @@ def refused(sentence: str) -> None:
     """Show why something was not done."""
     with block("div", "verdict bad", role="alert"):
         for line in page_words(sentence).splitlines():
-            text(line)
+            text(capitalized(line) if _PLAIN_START.match(line) else line)
 
 
 def notify(sentence: str) -> None:

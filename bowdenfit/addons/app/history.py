@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bowdenfit.addons.app.elements import address, block, link, text
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.workbench import Workbench, file_checksum
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError
@@ -102,7 +103,7 @@ def _is_changed(folder: Path, file: str, checksum: str) -> bool:
 def show_past_fit(fit: PastFit) -> None:
     """Show a fit as a card says it."""
     if fit.answer:
-        text(fit.answer, "p", "said", dir="auto")
+        text(page_words(fit.answer), "p", "said", dir="auto")
         text(_VERDICTS[fit.state], "p", f"state {fit.state}")
         text(f"{fit.date} UTC, seed {fit.seed}", "p", "hint")
     else:

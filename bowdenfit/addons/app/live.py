@@ -9,8 +9,9 @@ from typing import Any
 from nicegui import ui
 
 from bowdenfit.addons.app.elements import address, block, button, field, markup, text, text_input
-from bowdenfit.addons.app.frame import attempt, frame, refused, section
-from bowdenfit.addons.app.page_words import page_words
+from bowdenfit.addons.app.equivalent_command import EquivalentCommand, write_command
+from bowdenfit.addons.app.frame import attempt, frame, refused
+from bowdenfit.addons.app.page_words import page_html, page_words
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, Faults, UsageError
@@ -18,12 +19,23 @@ from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.pages.page import render_section
 from bowdenfit.pages.section import Picture, prose_section
 from bowdenfit.questions import watch as watch_room
+from bowdenfit.questions.watch.verb import VERB as WATCH
 from bowdenfit.questions.watch.verb import watch
 from bowdenfit.words import capitalized
 
 _TICK = 0.5  # s between two looks at what is known; a judgement
 _MOST_LINES = 2000  # of what is printed, that a page keeps; a judgement
 _HEADING = "How the answer narrowed"
+
+
+def request_watching(folder: Path, until: str) -> dict[str, Any]:
+    """Return what `watch` is asked of a data set.
+
+    Args:
+        folder: The data set.
+        until: As it is typed, see `WatchedBench`.
+    """
+    return {"dataset": folder, "until": until or None}
 
 
 class WatchedBench:
@@ -38,7 +50,7 @@ class WatchedBench:
         self.until, self.printed, self.refusal, self.unreadable, self.version = until, "", "", "", 0
         self.history: Any = watch_room.History()
         self._folder, self._stopped = folder, threading.Event()
-        answers = watch(folder, until=until or None, is_stopped=self._stopped.is_set)
+        answers = watch(**request_watching(folder, until), is_stopped=self._stopped.is_set)
         self._thread = threading.Thread(target=self._follow, args=(answers,), daemon=True)
         self._thread.start()
 
@@ -77,10 +89,14 @@ class LivePage:
     Args:
         workbench: Where it lies.
         name: Name of the data set.
+
+    Raises:
+        UsageError: There is no such data set.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:
         self._workbench, self._name, self._shown, self._until = workbench, name, -1, ""
+        self._folder = workbench.data_set(name)
         title = workbench.title_of(name)
         with frame("Live", ((title, address("data", name)),)):
             text("Whenever a file of this data set has a new complete row or recording, it is read and fitted again.")
@@ -111,22 +127,31 @@ class LivePage:
                 text_input("until", self._until, self._state_until)
             with block("div", "row"):
                 button("Watch the bench", lambda: attempt(self._start), "primary")
+            folder = self._workbench.folder
+            self._command = EquivalentCommand([self._written], f"In {folder}:", key="watch-command")
 
     @property
     def _example(self) -> str:
         """A standard deviation that this cable can be known to: of its best length, or of a coefficient."""
         with suppress(BowdenfitError):
-            route = load_description(self._workbench.data_set(self._name) / DESCRIPTION_FILE, faults=Faults()).route
+            route = load_description(self._folder / DESCRIPTION_FILE, faults=Faults()).route
             return f"10{route.unit}" if route is not None else "0.005"
         return "0.005"
 
+    @property
+    def _written(self) -> str:
+        """The command that watches as the button does."""
+        request = request_watching(self._folder, self._until)
+        return write_command(WATCH, request, self._workbench.folder)
+
     def _state_until(self, typed: str) -> None:
         self._until = typed.strip()
+        self._command.show(self._written)
 
     def _start(self) -> None:
         if self._bench is not None and self._bench.running:
             raise UsageError(f"{self._workbench.title_of(self._name)} is watched already; stop that first.")
-        self._workbench.watched[self._name] = WatchedBench(self._workbench.data_set(self._name), self._until)
+        self._workbench.watched[self._name] = WatchedBench(self._folder, self._until)
         self._shown = -1
         self._draw()
 
@@ -149,14 +174,15 @@ class LivePage:
             if bench.refusal:
                 text(page_words(bench.refusal), "p", "fault", role="alert")
             markup(words, "div", id="history")
-            with section("As the command line prints it", "lines"):
+            with block("details"):
+                text("Line by line", "summary")
                 text(page_words(bench.printed), "pre", tabindex="0", role="log", id="printed")
 
 
 def _show_headline(answer: Any) -> None:
     """Show the answer and its verdict, large enough for the other side of a bench."""
     _, _, words = watch_room.describe_answer(answer).rstrip("; ").partition("  ")
-    text(words, "p", "live-answer", id="live-answer")
+    text(page_words(words), "p", "live-answer", id="live-answer")
     if answer.trusted is not None:
         verdict = capitalized(watch_room.describe_verdict(answer).rstrip("."))
         text(f"{verdict}.", "p", f"live-verdict state {_kind(answer)}")
@@ -179,4 +205,4 @@ def _render_history(bench: WatchedBench) -> str:
     charts = watch_room.history_figure.make_history_charts(history)
     picture = Picture("history", _HEADING, caption, charts, caption, alone=True)
     headline = last.stop or last.warning
-    return render_section(prose_section(_HEADING, history.sentences(), pictures=(picture,), headline=headline), {})
+    return page_html(render_section(prose_section(_HEADING, history.sentences(), pictures=(picture,), headline=headline), {}))

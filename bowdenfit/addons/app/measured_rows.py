@@ -120,7 +120,7 @@ def collect_rows(folder: Path, refusals: Sequence[Refusal] = ()) -> MeasuredRows
 
 def _list_file_rows(source: Source, path: Path, refusals: Sequence[Refusal]) -> FileRows:
     """Return the rows of readings of a file, with what becomes of each."""
-    table = read_table(path, sheet=source.sheets[0])
+    table = read_table(path, sheet=source.sheets_of(path)[0])
     own_entries = [part for part in source.settings.exclude if part.file in (None, source.name_of(path))]
     excluded = {row: part.reason for part in own_entries for row in part.rows}
     refused = {refusal.row: refusal.sentence for refusal in refusals if refusal.file == path.name}
@@ -140,7 +140,7 @@ def _find_unused(source: Source, path: Path, file: FileRows) -> list[UnusedRow]:
         return []
     whole = Source(source.kind, source.settings.model_copy(update={"exclude": ()}), source.description, source.folder)
     wanted = {quantity.name: quantity for quantity in (*_WANTED, *shared_columns(source.description))}
-    _, columns = whole.read_table(path, tuple(wanted.values()), sheet=source.sheets[0])
+    _, columns = whole.read_table(path, tuple(wanted.values()), sheet=source.sheets_of(path)[0])
     return [UnusedRow(source.kind, path.name, row, state, _read_numbers(columns, row)) for row, state in unused.items()]
 
 

@@ -9,9 +9,11 @@ from nicegui import ui
 
 from bowdenfit.addons.app.angle_charts import fit_curves
 from bowdenfit.addons.app.data_charts import make_pictures
+from bowdenfit.addons.app.description_edit import preview_exclusion
 from bowdenfit.addons.app.draft import Refusal
 from bowdenfit.addons.app.elements import block, button, field, markup, text, text_input
 from bowdenfit.addons.app.elements import report as report_text
+from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import attempt
 from bowdenfit.addons.app.measured_rows import LEFT_OUT, READ, FileRow, FileRows, MeasuredRows, collect_rows
 from bowdenfit.addons.app.page_words import page_words
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.check.data_set_words import Report
 
 ChangeRow: TypeAlias = Callable[[str, str, int, str | None], Awaitable[None]]
+_BY_USER = "left out by the user"  # in notes that stay in sight
 _MOST_ROWS = 400  # of a file, that a page shows; a judgement
 _MOST_COLUMNS = 12  # of a row; a judgement
 _ROW_CLICKED = """event => {
@@ -100,6 +103,10 @@ class MeasuredView:
             return
         typed = {"reason": ""}
 
+        def take_reason(words: str) -> None:
+            typed["reason"] = words
+            lines.show(preview_exclusion(self._folder, file.kind, file.file, number, words))
+
         async def leave_out() -> None:
             await attempt(lambda: change(file.kind, file.file, number, typed["reason"]))
 
@@ -107,10 +114,12 @@ class MeasuredView:
         with place, block("div", "asked"):
             hint = "It is saved in cable.toml, and stands in the report."
             with field(f"Why is row {number} of {file.file} left out?", "reason", hint):
-                text_input("reason", "", lambda words: typed.update(reason=words))
+                text_input("reason", "", take_reason)
             with block("div", "row"):
                 button(f"Leave row {number} out", leave_out, "primary", key="leave-out")
                 button("Keep it", place.clear)
+            preview = preview_exclusion(self._folder, file.kind, file.file, number, "...")
+            lines = EquivalentCommand([preview], "In cable.toml:", key="exclude-lines")
         ui.run_javascript("document.getElementById('reason')?.focus()")
 
 
@@ -125,15 +134,22 @@ def show_checked(report: "Report") -> None:
     with block("ul"):
         for line in (line for heading, lines in described if not heading for line in lines):
             text(line.strip(), "li")
-        for remark in report.measurements.remarks:
+        excluded = [remark for remark in report.measurements.remarks if _BY_USER in remark]
+        for remark in excluded:
             text(page_words(remark), "li", "hint")
+    if others := [remark for remark in report.measurements.remarks if remark not in excluded]:
+        with block("details"):
+            text(counted(len(others), "note"), "summary")
+            with block("ul"):
+                for remark in others:
+                    text(page_words(remark), "li", "hint")
     for heading, lines in described:
         if heading:
             with block("details"):
                 text(heading, "summary")
                 report_text("\n".join(lines))
     with block("details"):
-        text("As the command line prints it", "summary")
+        text("Everything that was read", "summary")
         report_text(str(report))
 
 

@@ -20,7 +20,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.outputs import refuse_link, replace_atomically
-from bowdenfit.questions.check.verb import check
+from bowdenfit.questions.check import check_data_set
 from bowdenfit.questions.watch.files import link_neighbors
 from bowdenfit.words import shown
 
@@ -85,7 +85,7 @@ class OpenTable:
             return CheckedRows(0)
         try:
             with self._copy_with(self._append(rows)) as copy:
-                report = str(check(copy))
+                report = str(check_data_set(copy, {}))
                 _refuse_unread_rows(read_table(copy / self.name), self, len(rows))
         except BowdenfitError as error:
             known = _known_refusals(self.folder)
@@ -235,7 +235,7 @@ def _refuse_unread_rows(table: RawTable, before: OpenTable, count: int) -> None:
 def _known_refusals(folder: Path) -> set[str]:
     """Return why a data set is refused as it is; empty where it is not."""
     try:
-        check(folder)
+        check_data_set(folder, {})
     except BowdenfitError as error:
         return {refusal.sentence for refusal in list_refusals(error)}
     return set()

@@ -16,6 +16,7 @@ from bowdenfit.addons.app.frame import frame, refused, style_and_script
 from bowdenfit.addons.app.live import LivePage
 from bowdenfit.addons.app.see import FitPage
 from bowdenfit.addons.app.side_by_side import TwoFitsPage
+from bowdenfit.addons.app.try_page import TryPage
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_policy
@@ -50,12 +51,7 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
 
     @ui.page("/data/{name}")
     def data_set(name: str) -> None:
-        try:
-            workbench.data_set(name)
-        except BowdenfitError as error:
-            _show_refusal(name, str(error))
-        else:
-            DataSetPage(workbench, name)
+        _show_unless_refused(name, lambda: DataSetPage(workbench, name))
 
     @ui.page("/describe/{name}")
     def describe(name: str) -> None:
@@ -67,21 +63,15 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
 
     @ui.page("/fit/{name}")
     def fit(name: str) -> None:
-        try:
-            workbench.results(name)
-        except BowdenfitError as error:
-            _show_refusal(name, str(error))
-        else:
-            FitPage(workbench, name)
+        _show_unless_refused(name, lambda: FitPage(workbench, name))
 
     @ui.page("/live/{name}")
     def live(name: str) -> None:
-        try:
-            workbench.data_set(name)
-        except BowdenfitError as error:
-            _show_refusal(name, str(error))
-        else:
-            LivePage(workbench, name)
+        _show_unless_refused(name, lambda: LivePage(workbench, name))
+
+    @ui.page("/try/{name}")
+    def try_by_hand(name: str, fit: str = "") -> None:
+        _show_unless_refused("Try by hand", lambda: TryPage(workbench, name, fit))
 
     @ui.page("/compare")
     def compare(one: str = "", other: str = "") -> None:

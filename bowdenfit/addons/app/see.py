@@ -1,6 +1,5 @@
 """The page of a fit: how far it is, then what it says."""
 
-from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,21 +19,25 @@ from bowdenfit.addons.app.elements import (
     text,
     text_input,
 )
+from bowdenfit.addons.app.equivalent_command import show_command, write_command
 from bowdenfit.addons.app.fit_job import FitJob
 from bowdenfit.addons.app.frame import attempt, frame, notify, refused, section
 from bowdenfit.addons.app.history import read_past_fit
+from bowdenfit.addons.app.page_words import page_html, page_words
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.display import Preformatted
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
 from bowdenfit.questions import next as next_room
 from bowdenfit.questions import report as report_room
-from bowdenfit.questions.summary.verb import reply, summary
+from bowdenfit.questions.length.verb import VERB as LENGTH_VERB
+from bowdenfit.questions.summary.verb import SUMMARY_VERB, reply, summary
 from bowdenfit.results.folder import CHAIN
 from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.verb import Reply
 
 if TYPE_CHECKING:
+    from bowdenfit.finished_fit import Fit
     from bowdenfit.results.record import Record
 
 _TICK = 0.5  # s between two looks at a fit that runs; a judgement
@@ -46,10 +49,14 @@ class FitPage:
     Args:
         workbench: Where the fit is.
         name: Name of the fit.
+
+    Raises:
+        UsageError: There is no such fit.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:
         self._workbench, self._name = workbench, name
+        workbench.results(name)
         self._running: tuple[tuple[ui.html, ui.html, ui.html], FitJob] | None = None
         self._answered = False  # whether the answer of the fit that runs is shown
         with frame(name):
@@ -133,8 +140,13 @@ class FitPage:
         chosen = {"name": likely}
 
         async def start(resume: bool) -> None:
-            request = partial(self._workbench.start_fit, self._name, chosen["name"], resume=resume, force=not resume)
-            if await attempt(request):
+            def go_on() -> None:
+                settings = job.request.settings if job is not None else ()
+                changes: dict[str, Any] = {"resume": resume, "force": not resume, "settings": settings}
+                request = self._workbench.request_fit(self._name, chosen["name"], **changes)
+                self._workbench.start_fit(request)
+
+            if await attempt(go_on):
                 await self.show()
 
         with section("This fit has no answer yet", "interrupted"):
@@ -165,9 +177,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
             with block("div") as left, section("The answer", "answer"):
                 answer = _show_text(printed)
                 loading = text("Loading the fit, for what can be asked of it ...", classes="hint", role="status")
-                with block("details"):
-                    text("As the command line prints it", "summary")
-                    text(printed.text, "pre", tabindex="0", id="printed")
+                command = show_command(SUMMARY_VERB, {"results": folder}, workbench.folder, printed.text, key="summary-command")
             with block("div") as right:
                 pass
         below = block("div", id="everything")
@@ -180,10 +190,14 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
     answer.classes(remove="answer verdict good bad doubtful")
     answer.set_content(first)
     loading.delete()
+    if fit.sampled is not None and fit.dataset.description.route is not None:
+        shown = ((SUMMARY_VERB, {"results": folder}), (LENGTH_VERB, {"fit": folder}))
+        command.show(*(write_command(verb, request, workbench.folder) for verb, request in shown))
     with left:
-        show_arriving(workbench, fit)
+        show_arriving(workbench, fit, name)
+        _show_trying(workbench, fit, name)
         show_next(workbench, fit, name)
-        show_files(name)
+        show_files(workbench, name)
         _show_keeping(workbench, name)
     with right, section(report_room.FIGURES_TITLE, "figures"):
         markup(pictures, "div")
@@ -194,6 +208,13 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         for heading, key, html in parts:
             with section(heading, key):
                 markup(html, "div")
+
+
+def _show_trying(workbench: Workbench, fit: "Fit", name: str) -> None:
+    """Show the way to trying coefficients by hand, where the data set of a fit is here as it was fitted."""
+    if data_set := workbench.data_set_of(fit, name):
+        with block("div", "row"):
+            link("Try by hand, and its likelihood", address("try", data_set, fit=name), "button")
 
 
 def _show_keeping(workbench: Workbench, name: str) -> None:
@@ -233,7 +254,8 @@ def _show_contents(parts: list[tuple[str, str]]) -> None:
 def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str) -> list[Any]:
     """Return the answer, (heading, HTML) of what else the report says but what to measure next, and the figures, as HTML."""
     drawings = {figure: f"{root}{address('kept', name, f'{figure}.png')}" for figure in figures}
-    sections = {part.title: render_section(part, drawings) for part in report_room.report_page(fit, figures).sections}
+    parts = report_room.report_page(fit, figures).sections
+    sections = {part.title: page_html(render_section(part, drawings)) for part in parts}
     first, *others = sections
     elsewhere = {report_room.FIGURES_TITLE, next_room.TITLE}  # which have their own places on this page
     shown = [(title, sections[title]) for title in others if title not in elsewhere]
@@ -242,7 +264,8 @@ def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str)
 
 def _show_text(printed: Reply) -> Any:
     """Show a summary as it was written, and return where it is."""
-    return markup(Preformatted(printed.text).to_html(), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
+    words = Preformatted(page_words(printed.text)).to_html()
+    return markup(words, "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
 
 
 def _kind_of(printed: Reply) -> str:

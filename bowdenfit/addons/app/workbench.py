@@ -188,24 +188,31 @@ class Workbench:
         taken = {name for name, job in self.jobs.items() if not job.is_void}
         return next(free for free in names if not (self.folder / FITS / free).exists() and free not in taken)
 
-    def start_fit(self, name: str, data_set: str, seed: int | None = None, resume: bool = False, force: bool = False) -> FitJob:
-        """Start a fit, or go on with one.
+    def request_fit(self, name: str, data_set: str, seed: int | None = None, **changes: Any) -> FitRequest:
+        """Return the request for a fit, or for going on with one.
 
         Args:
             name: Name of the fit.
             data_set: Which.
             seed: Random seed.
-            resume: Whether an interrupted fit goes on.
-            force: Whether an earlier one is replaced.
+            changes: Other arguments of `FitRequest`.
 
         Raises:
-            UsageError: The name is not one of a folder, it runs already, or there is no such data set.
+            UsageError: The name is not one of a folder, or there is no such data set.
         """
         refuse_folder_name(name)
+        return FitRequest(self.data_set(data_set), self.folder / FITS / name, seed, **changes)
+
+    def start_fit(self, request: FitRequest) -> FitJob:
+        """Start a fit, or go on with one.
+
+        Raises:
+            UsageError: It runs already.
+        """
+        name = request.output.name
         job = self.jobs.get(name)
         if job is not None and job.running:
             raise UsageError(f"the fit {name} runs already; wait for it, or cancel it.")
-        request = FitRequest(self.data_set(data_set), self.folder / FITS / name, seed, resume=resume, force=force)
         self.jobs[name] = FitJob(request)
         return self.jobs[name]
 

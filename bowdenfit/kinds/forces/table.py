@@ -116,7 +116,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         DatasetError: See `read_table` and `find_columns`; or a force is not positive, or a stroke is unknown.
     """
     paths, contacts = source.files, source.description.angle_columns
-    faults, sheets = Faults(), [(path, sheet) for path in paths for sheet in source.sheets]
+    faults, sheets = Faults(), [(path, sheet) for path in paths for sheet in source.sheets_of(path)]
     read = faults.read_all(lambda sheet: _read_force_file(*sheet, source), sheets, None)
     parts = [part for part in read if part is not None]
     faults.refuse()

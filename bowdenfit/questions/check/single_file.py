@@ -1,14 +1,18 @@
 """What `bowdenfit check FILE` says of a file alone: what it is, its columns or channels, and the command that fits it."""
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import cast
 
 import numpy as np
 
 from bowdenfit.dataset import Dataset, is_lone_file, single_file_dataset
+from bowdenfit.display import Block, Display, Preformatted, blocks_of
 from bowdenfit.errors import BowdenfitError, DatasetError
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import Channel, ChannelFile
@@ -16,6 +20,7 @@ from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.formats import TEXT, WORKBOOKS
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
 from bowdenfit.files.isolation import limits_times
+from bowdenfit.frames import FILE, Frame, keyword_of, write_frame
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, make_commands
@@ -39,9 +44,56 @@ _LEFT = ("column", "unit", "read as")  # columns aligned to the left
 _MAX_NAMED = 8  # channels whose first and last sample are named
 _LONG = 50  # rows from which a table beside a clock is meant as a recording; with fewer its clock may say when each was read
 _MOST_NEIGHBORS = 40  # files of a folder that are looked at; a judgement
+_COMMAND = re.compile(r"^  bowdenfit fit .*\n(?:    .*\n)*", re.MULTILINE)
 _MAX_LISTED = 100  # channels that are listed
 _MAX_LENGTH = 60  # characters of a name or unit
 _CHANNEL_HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
+
+
+@dataclass(frozen=True, repr=False)
+class LoneReport(Display):
+    """What a table or recording holds that does not state its wrap angle, as `bowdenfit check FILE` shows it.
+
+    Args:
+        text: The report.
+        is_usable: Whether it can be fitted once the angle is stated.
+    """
+
+    text: str
+    is_usable: bool
+
+
+@blocks_of.register
+def _lone_blocks(report: LoneReport) -> Sequence[Block]:
+    return [Preformatted(report.text)]
+
+
+def describe_lone_table(table: str | Path | Frame, reading: Reading) -> LoneReport:
+    """Describe a file or data frame that does not state its wrap angle.
+
+    Args:
+        table: The file or data frame.
+        reading: Keywords of `bowdenfit.read`.
+
+    Raises:
+        BowdenfitError: It cannot be read, or not with these keywords.
+    """
+    if isinstance(table, str | Path):
+        return LoneReport(*describe_single_file(Path(table), reading))
+    with TemporaryDirectory() as folder:
+        text, is_usable = describe_single_file(write_frame(table, Path(folder)), reading)
+    return LoneReport(_COMMAND.sub(_write_call, text).replace(FILE, "the data frame"), is_usable)
+
+
+def _write_call(command: re.Match[str]) -> str:
+    """Return the call of Python that does what a command does with a data frame."""
+    _, _, _, *words = shlex.split(command[0].replace("\\\n", " "))
+    keywords: dict[str, list[str]] = {}
+    for option, argument in zip(words[::2], words[1::2], strict=True):
+        keywords.setdefault(keyword_of(option), []).append(argument)
+    several = {"columns", "missing", "settings"}
+    stated = [f"{name}={values if name in several else repr(values[0])}" for name, values in keywords.items()]
+    return f"  bf.fit({', '.join(['frame', *stated])})\n"
 
 
 def is_single_file(path: Path) -> bool:

@@ -1,12 +1,12 @@
 """Check a data set: say what was understood of it, and look at its priors, before anything is fitted."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Unpack
+from typing import TYPE_CHECKING, Annotated, Unpack, cast
 
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, PATH, read_first
-from bowdenfit.errors import DatasetError
+from bowdenfit.errors import DatasetError, MissingAngleError
 from bowdenfit.questions import check as room
 from bowdenfit.reading import Reading
 from bowdenfit.verb import Reply, Verb
@@ -15,20 +15,30 @@ if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.frames import Frame
     from bowdenfit.questions.check.data_set_words import Report
+    from bowdenfit.questions.check.single_file import LoneReport
 
 
 @read_first
-def check(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **reading: Unpack[Reading]) -> "Report":
+def check(
+    dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **reading: Unpack[Reading]
+) -> "Report | LoneReport":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
         reading: Keywords of `bowdenfit.read`.
 
+    Returns:
+        The data set, which shows itself as the command does; of a file or data frame that does not state its wrap angle, what
+        it holds, and the call that fits it.
+
     Raises:
         DescriptionError, DatasetError: The fault, in a sentence.
     """
-    return room.check_data_set(dataset, reading)
+    try:
+        return room.check_data_set(dataset, reading)
+    except MissingAngleError:
+        return room.describe_lone_table(cast("str | Path | Frame", dataset), reading)
 
 
 @read_first
@@ -50,7 +60,7 @@ def describe(
         describe_file = room.describe_joined_files if reading.get("join") else room.describe_single_file
         text, usable = describe_file(dataset, reading)
         return Reply(text, exit_code=0 if usable else DatasetError.exit_code)
-    report = check(dataset, **reading)
+    report = cast("Report", check(dataset, **reading))
     text = room.describe_data_set(report)
     if prior_predictive is not None:
         text += room.describe_prior_predictive(room.show_priors(report, prior_predictive))

@@ -343,8 +343,11 @@ def _points_group(points: EfficiencyPoints) -> SeriesGroup:
     series = [Series(label, "points", "black", np.where(inside, measured, np.nan))]
     if not inside.all():
         series.append(Series(f"{label}, outside the range", "hollow", "black", np.where(inside, np.nan, measured)))
-        predicted = 100 * points.predicted[len(points.predicted) // 2, order]
-        series.append(Series("Predicted there", "hollow", "blue", np.where(inside, np.nan, predicted)))
+        rows = np.where(inside, np.nan, 100 * points.predicted[:, order])
+        if len(rows) > 1:
+            label = f"Predicted there, {WIDE_INTERVAL}"
+            series += [Series(label, "from", "blue", rows[0]), Series(label, "to", "blue", rows[-1])]
+        series.append(Series("Predicted there", "hollow", "blue", rows[len(rows) // 2]))
     return SeriesGroup(route, tuple(series))
 
 

@@ -3,13 +3,13 @@
 Keys come in the order in which a person would write them.
 """
 
-import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from bowdenfit.description import SCHEMA
+from bowdenfit.description.toml_text import format_toml
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import find_stated_angle
@@ -32,15 +32,13 @@ from bowdenfit.questions.start.question import (
 )
 from bowdenfit.reading import Reading, read
 from bowdenfit.recordings.named_channels import parse_channels
-from bowdenfit.words import listed
+from bowdenfit.words import listed, shown
 
 _REMARKS = {
     "schema": "Written by `bowdenfit init` from the files next to it; `bowdenfit check` says how it is understood.",
     "route": "What the design question varies, and where the curves of the wrap angles hold.",
     "contact": "One [[contact]] for each place where the rope rubs; contacts may share a coefficient.",
 }
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
-_MAX_LINE = 100  # characters, beyond which a table gets a heading of its own; a judgement of what reads well
 
 
 def write_description(paths: Sequence[Path], default_name: str, asker: Asker) -> str:
@@ -182,13 +180,32 @@ def _table_entries(measured_files: Sequence[MeasuredFile]) -> dict[str, Any]:
         for file in group:
             settings |= file.settings
         if any(columns != columns_by_file[0] for columns in columns_by_file):
-            raise DatasetError(
-                f"the columns of {listed([file.name for file in group])} are not called alike; give them the same headings, or "
-                "put them into one file."
-            )
+            raise DatasetError(_describe_other_headings(group))
         place = _files_and_sheets(group)
         tables[kind.name] = {**place, **settings, **({"columns": columns_by_file[0]} if columns_by_file[0] else {})}
     return tables
+
+
+def _describe_other_headings(group: Sequence[MeasuredFile]) -> str:
+    """Say which columns of tables that belong together have other headings."""
+    differing = [
+        name
+        for name in dict.fromkeys(name for file in group for name in file.assigned)
+        if len({_named_sources(file).get(name, {}).get("name") for file in group}) > 1
+    ]
+    clauses = []
+    for name in differing:
+        by_heading: dict[str, list[str]] = {}
+        for file in group:
+            by_heading.setdefault(file.assigned.get(name, ""), []).append(file.name)
+        places = [f"{shown(heading) if heading else 'no column'} in {listed(files)}" for heading, files in by_heading.items()]
+        clauses.append(f"{name} is {'; '.join(places)}")
+    files = listed([file.name for file in group])
+    which = f": {'. '.join(clauses)}" if clauses else ""
+    return (
+        f"the columns of {files} are not called alike{which}. The usual cause is a heading that somebody typed again; give "
+        "these columns the same heading in all files, or leave a file out and fit it by itself."
+    )
 
 
 def _files_and_sheets(group: Sequence[MeasuredFile]) -> dict[str, Any]:
@@ -198,14 +215,15 @@ def _files_and_sheets(group: Sequence[MeasuredFile]) -> dict[str, Any]:
         DatasetError: Sheets of several workbooks have different titles.
     """
     files = list(dict.fromkeys(file.path.name for file in group))
-    sheets = list(dict.fromkeys(file.sheet for file in group))
-    if len(files) * len(sheets) != len(group):
+    sheets = list(dict.fromkeys(file.sheet for file in group if file.sheet))
+    on_sheets = [file for file in group if file.sheet]
+    if len({file.path.name for file in on_sheets}) * len(sheets) != len(on_sheets):
         raise DatasetError(
             f"the sheets of {listed([file.name for file in group])} have different titles; give them the same, or leave a "
             "file out."
         )
     entries: dict[str, Any] = {"files": files} if len(files) > 1 else {"file": files[0]}
-    return entries | ({"sheet": sheets[0] if len(sheets) == 1 else sheets} if any(sheets) else {})
+    return entries | ({"sheet": sheets[0] if len(sheets) == 1 else sheets} if sheets else {})
 
 
 def _named_sources(file: MeasuredFile) -> dict[str, Any]:
@@ -229,6 +247,8 @@ def _recording_entries(
                 f"{file.name} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
             )
             words = f"What was the wrap angle of {file.name}, with its unit?"
+            if stated:
+                reason = f"{file.name}: {stated[0]} is what {stated[1]} says; confirm it, or write the right one."
             value, unit = asker.ask(quantity_question(words, "angle", "90 deg", reason, stated[0] if stated else None))
             entry.setdefault("wrap_angles", {})[name] = {"value": value, "unit": unit}
         channels = _named_sources(file)
@@ -247,69 +267,3 @@ def _ask_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> float:
     words = f"At which length, in {unit}, was {file.name} recorded?"
     proposed = named[0].replace(",", ".") if len(named) == 1 else None
     return asker.ask(number_question(words, proposed, "" if proposed else reason, "470"))
-
-
-def format_toml(page: Mapping[str, Any], remarks: Mapping[str, str]) -> str:
-    """Return a description as TOML: plain values, then tables, then lists of tables.
-
-    Args:
-        page: Plain data.
-        remarks: Comment above a key, by key.
-    """
-    lines = list[str]()
-    for key, value in page.items():
-        is_list = isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
-        if lines and (is_list or isinstance(value, Mapping)):
-            lines.append("")
-        lines += [f"# {line}" for line in remarks.get(key, "").splitlines()]
-        if is_list:
-            for i, entry in enumerate(value):
-                lines += [""] * (i > 0) + [f"[[{_format_key(key)}]]", *map(_format_line, entry, entry.values())]
-        elif isinstance(value, Mapping):
-            lines += _format_section([key], value)
-        else:
-            lines.append(_format_line(key, value))
-    return "\n".join(lines) + "\n"
-
-
-def _format_section(path: Sequence[str], page: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a table under its heading; long tables in it follow under headings of their own."""
-    long = {
-        key: value
-        for key, value in page.items()
-        if isinstance(value, Mapping) and len(_format_line(key, value)) > _MAX_LINE
-    }
-    short = {key: value for key, value in page.items() if key not in long}
-    if short:
-        yield f"[{'.'.join(map(_format_key, path))}]"
-        yield from map(_format_line, short, short.values())
-    for i, (key, value) in enumerate(long.items()):
-        if short or i:
-            yield ""
-        yield from _format_section([*path, key], value)
-
-
-def _format_line(key: str, value: Any) -> str:
-    """Format a key with its value."""
-    return f"{_format_key(key)} = {_format_value(value)}"
-
-
-def _format_key(name: str) -> str:
-    """Format a key, quoted where TOML needs that."""
-    return name if _BARE.fullmatch(name) else _format_value(name)
-
-
-def _format_value(value: Any) -> str:
-    """Format a value on one line, or a long list over several."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float | int):
-        return f"{value:.12g}"
-    if isinstance(value, Mapping):
-        inside = ", ".join(map(_format_line, value, value.values()))
-        return f"{{ {inside} }}" if inside else "{}"
-    if isinstance(value, list):
-        parts = [_format_value(entry) for entry in value]
-        line = f"[{', '.join(parts)}]"
-        return line if len(line) <= _MAX_LINE else "[\n" + "".join(f"    {part},\n" for part in parts) + "]"
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -101,8 +101,10 @@ class MeasuredFile:
     def _says_unit(self, quantity: Quantity, column: FileColumn) -> bool:
         """Return whether its unit stands where readers of tables find it."""
         wanted = FORCES if quantity in FORCES else (quantity,)
-        (match,) = find_candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
-        return match is not None and match.unit == column.unit and bool(column.unit)
+        headings = [(other.name, other.below) for other in self.columns]  # some say what they are only next to others
+        matches = find_candidates(headings, wanted)[quantity.name]
+        is_alone = [headings[match.position][0] for match in matches] == [column.name]
+        return is_alone and matches[0].unit == column.unit and bool(column.unit)
 
     def state(self, heading: str, quantity: str, unit: str) -> None:
         """Take what somebody states of a column, in place of what its heading says.

@@ -2,6 +2,7 @@
 
 import http.client
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -47,6 +48,14 @@ def printed_by(*arguments):
     """What the command line prints."""
     command = [sys.executable, "-m", "bowdenfit", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout
+
+
+def printed_by_shown(page, verb, folder):
+    """What a command prints that a page shows as equivalent."""
+    shown = shlex.split(page.text_content(f"#{verb}-command"))
+    assert shown[0] == "bowdenfit"
+    command = [sys.executable, "-P", "-m", *shown]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder).stdout
 
 
 def text_on(page, selector):
@@ -133,7 +142,7 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
     with visiting(chromium, app) as visit:
         page = visit.page
         page.goto(f"{visit.root}/fit/on-body")
-        page.get_by_text("As the command line prints it").click()
+        page.locator("#printed").evaluate("printed => printed.closest('details').open = true")
         assert text_on(page, "#printed") == printed_by("summary", results).strip()
         page.locator("#arrives p").first.wait_for()
         page.locator("#dial-0").press("ArrowRight")
@@ -142,12 +151,13 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
         page.wait_for_function("document.querySelector('#arrives').innerText.includes(document.querySelector('output').innerText)")
         length, force = (page.inner_text(f"output[for=dial-{number}]") for number in (0, 1))
         assert [float(page.input_value(f"#dial-{number}")) for number in (0, 1)] == [float(length), float(force)]
-        printed = printed_by("predict", results, length, "--input-force", f"{force}N")
-        assert text_on(page, "#arrives").split() == printed.split()
+        command = f"bowdenfit predict fits/on-body {length} --input-force {force}N"
+        page.wait_for_function("words => document.querySelector('#predict-command').textContent === words", arg=command)
+        assert text_on(page, "#arrives").split() == printed_by_shown(page, "predict", folder).split()
         page.get_by_role("button", name="Rank what could be measured next").click()
         page.locator("#ranking table").wait_for()
         page.get_by_role("link", name="Add rows to efficiencies.csv").wait_for()
-        advice = printed_by("next", results).split("\n\n")[0].split()
+        advice = printed_by_shown(page, "next", folder).split("\n\n")[0].split()
         shown = " ".join(text_on(page, "#ranking").split())
         for sentence in re.split(r"(?<=[a-z]\.) ", " ".join(advice)):  # what is said of stopping stands first
             assert sentence in shown
@@ -189,7 +199,7 @@ def test_from_an_empty_page_to_a_report(chromium, tmp_path):
         page.reload()  # in the middle of the fit
         page.locator(".stage .clock").wait_for()
         page.locator("#answer-text").wait_for(timeout=180_000)
-        page.get_by_text("As the command line prints it").click()
+        page.locator("#printed").evaluate("printed => printed.closest('details').open = true")
         answer = text_on(page, "#printed")
         page.locator("#arrives p").first.wait_for()
         with page.context.expect_page() as opened:

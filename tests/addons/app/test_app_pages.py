@@ -1,6 +1,9 @@
 """Pages beside the way from an empty page to an answer: fits that end early, several tabs, two cables, a watched bench."""
 
+import shlex
 import shutil
+import subprocess
+import sys
 
 import pytest
 from app_in_browser import faults_of, served, visiting, watch
@@ -109,6 +112,10 @@ def test_two_cables_stand_side_by_side_and_a_bench_is_watched(chromium, tmp_path
         page.locator("#comparison .uplot").wait_for()
         assert "new minus worn" in page.inner_text("#comparison")
         assert "different (higher) with probability" in page.inner_text("#comparison")
+        _, *shown = shlex.split(page.text_content("#compare-command"))  # of Python, as no command compares two cables
+        done = subprocess.run([sys.executable, *shown], capture_output=True, text=True, check=True, cwd=tmp_path)
+        for sentence in done.stdout.splitlines():
+            assert sentence in page.inner_text("#comparison").replace("\N{NO-BREAK SPACE}", " ")
         assert faults_of(page) == []
         page.goto(f"{visit.root}/live/worn")
         page.get_by_role("button", name="Watch the bench").click()

@@ -25,7 +25,7 @@ def test_a_fit_cancelled_before_sampling_leaves_no_folder_and_no_name(tmp_path):
     (tmp_path / "scratch").mkdir()
     workbench = Workbench(tmp_path / "bench", tmp_path / "scratch")
     folder = tmp_path / "bench" / "fits" / "yarn"
-    job = workbench.start_fit("yarn", "yarn", seed=1)
+    job = workbench.start_fit(workbench.request_fit("yarn", "yarn", seed=1))
     wait_for(folder.is_dir)
     job.cancel()
     wait_for(lambda: not job.running)

@@ -67,7 +67,7 @@ def test_files_are_drawn_while_they_are_added_and_refused_rows_are_red(chromium,
         page.get_by_role("button", name="New data set").click()
         spoiled = ROWS.replace("60,46.0", "60,slip")
         page.set_input_files("input[type=file]", {"name": "b.csv", "mimeType": "text/csv", "buffer": spoiled.encode()})
-        page.locator("#figure-sketch .uplot").wait_for()
+        page.locator("#figure-sketch-0 .uplot").wait_for()
         page.get_by_label("By which angle").fill("180 deg")
         page.keyboard.press("Tab")
         page.locator("#figure-data-forces .uplot").wait_for()

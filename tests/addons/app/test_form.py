@@ -1,5 +1,8 @@
 """The questions of `init` as a form, and what is understood of files on their way to a data set."""
 
+import tomllib
+
+import openpyxl
 import pytest
 
 from bowdenfit.addons.app.data_set import read_seed
@@ -93,6 +96,31 @@ def test_a_refusal_names_the_cell_that_it_speaks_of(draft_of):
     refusal = next(r for r in answer(draft, "By which angle", "180 deg").refusals if r.row)
     assert (refusal.file, refusal.row, refusal.column) == ("forces.csv", 5, "F_out (N)")
     assert refusal.sentence.startswith("forces.csv, row 5, column 'F_out (N)': ")
+
+
+def test_tables_and_a_workbook_become_one_table_and_other_headings_are_named(tmp_path):
+    """Headings as a German bench writes them; the sheet is that of the workbook alone."""
+    head = "Lauf;Kraft Motor (N);Kraft Last (N);Richtung;Umschlingungswinkel (°)"
+    german = (head, "1;20,1;15,0;ziehen;90", "1;40,3;30,2;ziehen;90")
+    (tmp_path / "a.csv").write_text("\n".join([*german, ""]), encoding="cp1252")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "Kräfte"
+    book.create_sheet("Notizen").append(["nothing"])
+    for row in (["Lauf", "Kraft Motor", "Kraft Last", "Richtung", "Umschlingungswinkel"], ["", "N", "N", "", "°"],
+                [7, 20.2, 11.9, "ziehen", 180], [8, 41.0, 23.8, "ziehen", 180]):  # fmt: skip
+        sheet.append(row)
+    book.save(tmp_path / "b.xlsx")
+    draft = Draft(tmp_path)
+    understanding = draft.understand()
+    assert understanding.refusals == ()
+    tables = tomllib.loads(understanding.description)["tables"]
+    assert tables == {"forces": {"files": ["a.csv", "b.xlsx"], "sheet": "Kräfte"}}
+    assert "4 force readings in 3 runs" in understanding.report
+    sheet["E1"] = "Winkel"
+    book.save(tmp_path / "b.xlsx")
+    (refusal,) = draft.understand().refusals
+    assert "wrap_angle is 'Umschlingungswinkel (°)' in a.csv; 'Winkel' in b.xlsx" in refusal.sentence
 
 
 def test_a_draft_with_open_questions_is_not_written(draft_of, tmp_path):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
+from bowdenfit.questions.length import efficiency_figure
+from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints, make_efficiency_chart
 from bowdenfit.questions.loss import ContactShare, LossByContact, make_loss_chart
 from bowdenfit.questions.summary.coefficients_figure import Coefficient, make_coefficient_charts
 from bowdenfit.questions.summary.pairs_figure import FILLS, Pairs, SampledQuantity, find_region_edges, make_pair_charts
@@ -64,6 +65,15 @@ def test_the_charts_of_residuals_name_their_rows(sampled):
     assert series["Outside the range of the curves", "hollow"][1] == pytest.approx(-5.0)
     if sampled:
         assert series["Predicted, 90 % interval", "from"] == pytest.approx([-5.0, -5.0])
+
+
+@pytest.mark.extended
+def test_a_reading_outside_the_range_has_the_interval_of_its_prediction(quick_fit):
+    (chart,) = make_efficiency_chart(efficiency_figure.data(quick_fit))
+    (points,) = [group for group in chart.groups if 550.0 in group.x]
+    values = {(series.label, series.look): series.values[points.x == 550.0][0] for series in points.series}
+    low, high = values["Predicted there, 90 % interval", "from"], values["Predicted there, 90 % interval", "to"]
+    assert 60 < low < values["Predicted there", "hollow"] < high < 76
 
 
 def test_the_chart_of_the_loss_names_its_contacts():

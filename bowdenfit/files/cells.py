@@ -20,11 +20,11 @@ _WHOLE = re.compile(r"[+-]?[1-9]\d{2,}")
 _MISSING_CODE = re.compile(r"-(?:9{2,}(?:[.,](?:9+|0+))?|32768)")
 _SPACES = "\t\v\f\x85\xa0\u2000\u2001\u2002\u2003\u2004\u2005\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000"
 _TYPOGRAPHY = str.maketrans({"\u2212": "-", "’": "'", **dict.fromkeys(_SPACES, " ")})
-_EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
+_EXCEL_MARKS = "#n/a #na #nv #n/d #div/0! #value! #wert! #valeur! #num! #zahl! #ref! #bezug!"
 _NAN_MARKS = "--- <na> nan -nan +nan 1.#qnan -1.#ind"
 _INFINITE = "inf +inf -inf infinity -infinity ∞ -∞ +∞ 1.#inf -1.#inf"
 _OVERFLOW = "overflow +overflow -overflow overrange overload ovld ovrflw"
-BLANK = frozenset({"", "-", "--", "n/a", "na", "n.d.", "nd", "none", "null"})
+BLANK = frozenset({"", "-", "--", "n/a", "na", "n.a.", "n. a.", "k.a.", "k. a.", "n.d.", "nd", "none", "null"})
 NOT_FINITE = frozenset(f"{_EXCEL_MARKS} {_NAN_MARKS} {_INFINITE} {_OVERFLOW}".split())
 MISSING = BLANK | NOT_FINITE
 """What recordings have in the place of a missing sample; a table may leave cells blank, but not be infinite."""

@@ -37,7 +37,7 @@ from bowdenfit.files.sheet_columns import (
     read_arrays,
 )
 from bowdenfit.files.sheet_rows import is_summary, refuse_other_separator
-from bowdenfit.files.sheet_text import choose_decimal, explain_lines, split_rows
+from bowdenfit.files.sheet_text import choose_decimal, explain_lines, find_headings_in_comments, split_rows
 from bowdenfit.files.text_file import (
     CsvRecord,
     Line,
@@ -291,10 +291,8 @@ def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separato
 
 def _take_headings_from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
     width = len(layout.kinds)
-    for line in reversed([line for line in above if comment_mark(line.text)]):
-        cells = split_cells(line.text.strip().lstrip("#% "), separator)
-        if len(cells) == width and all(cell.strip() for cell in cells):
-            return replace(layout, named=True, headings=tuple(map(heading_of, cells)))
+    if headings := find_headings_in_comments(above, width, separator):
+        return replace(layout, named=True, headings=tuple(map(heading_of, headings.cells)))
     return replace(layout, named=False, headings=tuple(Heading(f"column{i + 1}") for i in range(width)))
 
 

@@ -9,10 +9,12 @@ from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, WORKBOOKS, check_ending, recognize, refuse_sheet
 from bowdenfit.files.headings import heading_of, repeated_heading
 from bowdenfit.files.isolation import LIMITS, call_isolated
+from bowdenfit.files.layout import header_position
 from bowdenfit.files.measured_cells import is_measured, split_measured
 from bowdenfit.files.pivot import unpivot
 from bowdenfit.files.row_account import RowAccount, make_account
-from bowdenfit.files.sheet_text import explain_lines, split_rows
+from bowdenfit.files.sheet_rows import is_words
+from bowdenfit.files.sheet_text import explain_lines, find_headings_in_comments, split_rows
 from bowdenfit.files.table_parts import TableParts, split_table
 from bowdenfit.files.text_file import (
     CsvRecord,
@@ -144,8 +146,18 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
             )
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    table = make_table(name, all_lines, rows, separator)
+    table = make_table(name, all_lines, _take_headings_from_comments(all_lines, rows, separator), separator)
     return replace(table, remarks=(*table.remarks, *(f"{name}: {remark}" for remark in remark_on_nul_tail(path))))
+
+
+def _take_headings_from_comments(lines: Sequence[Line], rows: list[CsvRecord], separator: str) -> list[CsvRecord]:
+    """Return the rows below the comment that names their columns, where no row of words does."""
+    filled = [row for row in rows if not row.blank]
+    if header_position(filled) is not None:
+        return rows
+    above = [line for line in lines if line.row < filled[0].row]
+    headings = find_headings_in_comments(above, len(filled[0].cells), separator)
+    return [headings, *rows] if headings and is_words(headings) else rows
 
 
 def _refuse_large(path: Path) -> None:

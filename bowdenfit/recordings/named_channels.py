@@ -26,7 +26,7 @@ WANTED = (
 TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of pulleys
 OUTPUT_CLOCK = "output_time"  # of the file of a second logger, where it is called otherwise than that of the first
 RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
-_PATH = re.compile(r"[/.]")
+_PATH = re.compile(r"[/.](?! )")  # "Force / N" has a unit behind its line
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 
 

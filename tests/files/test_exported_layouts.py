@@ -9,6 +9,8 @@ import bowdenfit as bf
 from bowdenfit.files import read_channels
 from bowdenfit.files.tables import read_table
 
+pytestmark = pytest.mark.extended
+
 TIME = np.arange(0, 16, 0.02)
 INPUT = 40 + 20 * np.sin(2 * np.pi * TIME / 8)
 OUTPUT = np.empty_like(INPUT)
@@ -155,3 +157,44 @@ def test_a_hanging_mass_is_the_output_beside_a_pulling_force_and_a_unit_may_foll
     body = "".join(f"{t:.2f};{a:.3f};{b:.3f}\n".replace(".", ",") for t, a, b in ROWS)
     for names in ("Zeit / s;Eingangskraft / N;Ausgangskraft / N\n", "Zeit / s;Bench/F_in [N];Bench/F_out [N]\n"):
         assert exponent(write(tmp_path, names + body)) == EXPONENT
+
+
+def as_text(number, mark):
+    return f"{number:.3f}".replace(".", mark)
+
+
+@pytest.mark.parametrize(
+    ("time", "mark", "separator", "scale", "outcome"),
+    [
+        ("0,01", ".", ";", 0.1, "may mean 4000 or 4.000, because elsewhere the file has '0,0"),
+        ("0.01", ",", "\t", 0.1, "may mean 4000 or 4.000, because elsewhere the file has '0.0"),
+        ("10", ".", ";", 0.1, "if these are thousands"),  # nothing in the file says which
+        ("10", ".", ";", 0.03, ""),  # the output falls below 1, so that these are decimals
+        ("0.01", ".", ";", 0.1, ""),
+        ("0,01", ",", ";", 0.1, ""),
+        ("10", ".", ",", 0.1, ""),
+    ],
+)
+def test_three_decimals_in_every_sample_are_asked_about_as_in_tables(tmp_path, run, time, mark, separator, scale, outcome):
+    step, digits = float(time.replace(",", ".")), 2 if time != "10" else 0
+    clock = [f"{step * i:.{digits}f}".replace(".", time[1]) for i in range(1, 1 + len(ROWS))]
+    body = [separator.join((clock[i], as_text(scale * a, mark), as_text(scale * b, mark))) for i, (_, a, b) in enumerate(ROWS)]
+    heading = separator.join(("time (ms)" if digits == 0 else "time (s)", "F_in (N)", "F_out (N)"))
+    path = write(tmp_path, "\n".join([heading, *body]) + "\n")
+    if "because" in outcome:
+        with pytest.raises(bf.DatasetError, match=outcome.replace(".", r"\.")):
+            read_channels(path)
+        return
+    remarks = " ".join(read_channels(path).remarks)
+    assert ("if these are thousands" in remarks) == bool(outcome)
+    if outcome:
+        fit = bf.fit(path, wrap_angle="180deg", mcmc=False)
+        assert "if these are thousands" in " ".join(str(fit.summary()).split())
+        assert fit.verdict().trusted
+
+
+def test_thousands_are_asked_about_before_the_wrap_angle_is_known(tmp_path, run):
+    text = "Winkel [Grad];Eingangskraft [N];Ausgangskraft [N]\n90;2.920;2.626\n180;3.920;2.626\n270;4.920;2.627\n"
+    code, out, _ = run("check", write(tmp_path, text))
+    assert code == 2 and "if these are thousands" in " ".join(out.split())
+    assert "these are thousands" not in run("check", write(tmp_path, text.replace("2.626", "2.63")))[1]

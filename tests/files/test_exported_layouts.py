@@ -198,3 +198,25 @@ def test_thousands_are_asked_about_before_the_wrap_angle_is_known(tmp_path, run)
     code, out, _ = run("check", write(tmp_path, text))
     assert code == 2 and "if these are thousands" in " ".join(out.split())
     assert "these are thousands" not in run("check", write(tmp_path, text.replace("2.626", "2.63")))[1]
+
+
+def test_counts_of_a_converter_are_no_newtons_and_volts_are_told_their_gain(tmp_path):
+    def counts(scale):
+        rows = [f"{1000 * t:.0f},{scale * a + 1000:.0f},{scale * b - 1000:.0f}" for t, a, b in ROWS]
+        return write(tmp_path, "\n".join(["millis,raw_in,raw_out", *rows]) + "\n")
+
+    named = ["input_force=raw_in:N", "output_force=raw_out:N"]
+    with pytest.raises(bf.DatasetError, match=r"channel 'raw_in': whole numbers up to 60\d{4} are the counts.* gain = "):
+        exponent(counts(10_000), channels=named)
+    exponent(counts(1000), channels=named)  # of 60 kN: counts or newtons
+    path = counts(10_000)
+    (tmp_path / "cable.toml").write_text(
+        'schema = 1\nname = "counts"\n[[contact]]\nname = "cable"\nfriction = "mu"\n'
+        'wrap_angle = { value = 180, unit = "deg" }\n[tables.recordings]\nfiles = "log.csv"\n[tables.recordings.channels]\n'
+        'input_force = { name = "raw_in", gain = 1e-4, offset = 1000, unit = "N" }\n'
+        'output_force = { name = "raw_out", gain = 1e-4, offset = -1000, unit = "N" }\n'
+    )
+    assert bf.read(path.parent).measurements.tables[0].items[0].strokes.exponent == EXPONENT
+    volts = write(tmp_path, "Time (s),Input force (V),Output force (V)\n0,1,1\n0.1,2,1\n")
+    with pytest.raises(bf.DatasetError, match=r"does not measure a force; use one such as N.* gain = "):
+        exponent(volts)

@@ -84,12 +84,9 @@ class LogGains:
         return np.asarray(1 / self.variances.sum(axis=1))
 
     def standardized(self, off: Vector) -> Vector:
-        """Return how far off readings are, in noises of 1 N: by their logarithms, or by newtons if that is farther.
+        """Return how far off readings are, in noises of 1 N, by residuals of log gains [1], or by newtons if that is more.
 
         A force that is smaller by a factor of 1000 is hardly known by its logarithm, and far from what the other one says.
-
-        Args:
-            off: Residual of each log gain [1].
         """
         is_output_low = (off < 0) == (self.stroke > 0)
         shrunk = np.where(np.column_stack([~is_output_low, is_output_low]), np.exp(-2 * np.abs(off))[:, None], 1.0)

@@ -71,7 +71,8 @@ _COMMON_UNITS = {
     "N/mm": ("stiffness", 1.0),
 }
 _WEIGHTS = {"kg": "kgf", "g": "gf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf", "oz": "ozf"}
-_PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm", "newton": "N", "newtons": "N"}
+_PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm", "newton": "N", "newtons": "N",
+               "sec": "s", "sek": "s", "msec": "ms"}  # fmt: skip
 # As engineers write torques without a sign between; to pint Nm is a number of yarn.
 _TORQUES = {"Nm": "N*m", "Nmm": "N*mm", "Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m"}
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.

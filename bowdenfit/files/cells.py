@@ -8,7 +8,7 @@ from typing import Literal
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import is_date
-from bowdenfit.words import shown
+from bowdenfit.words import listed, shown
 
 Kind = Literal["number", "date", "blank", "text"]
 _UNDETECTED = re.compile(r"(?:<=|<|≤|&lt;)(?P<limit>.*)", re.DOTALL)
@@ -20,11 +20,13 @@ _WHOLE = re.compile(r"[+-]?[1-9]\d{2,}")
 _MISSING_CODE = re.compile(r"-(?:9{2,}(?:[.,](?:9+|0+))?|32768)")
 _SPACES = "\t\v\f\x85\xa0\u2000\u2001\u2002\u2003\u2004\u2005\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000"
 _TYPOGRAPHY = str.maketrans({"\u2212": "-", "’": "'", **dict.fromkeys(_SPACES, " ")})
-_EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
+_EXCEL_MARKS = "#n/a #na #nv #n/d #div/0! #value! #wert! #valeur! #num! #zahl! #ref! #bezug!"
 _NAN_MARKS = "--- <na> nan -nan +nan 1.#qnan -1.#ind"
 _INFINITE = "inf +inf -inf infinity -infinity ∞ -∞ +∞ 1.#inf -1.#inf"
 _OVERFLOW = "overflow +overflow -overflow overrange overload ovld ovrflw"
-BLANK = frozenset({"", "-", "--", "n/a", "na", "n.d.", "nd", "none", "null"})
+AS_DECIMALS = "has three digits behind its mark"
+"""How a remark on columns that could hold thousands begins, which the page of a fit repeats."""
+BLANK = frozenset({"", "-", "--", "n/a", "na", "n.a.", "n. a.", "k.a.", "k. a.", "n.d.", "nd", "none", "null"})
 NOT_FINITE = frozenset(f"{_EXCEL_MARKS} {_NAN_MARKS} {_INFINITE} {_OVERFLOW}".split())
 MISSING = BLANK | NOT_FINITE
 """What recordings have in the place of a missing sample; a table may leave cells blank, but not be infinite."""
@@ -71,19 +73,20 @@ class Decimals:
                     wholes[i] = other
         return [replace(self, whole=whole) for whole in wholes]
 
-    def likely_thousands(self, columns: Sequence[Sequence[str]]) -> list[tuple[int, str]]:
-        """Return columns in which every number has three digits behind a point, though nothing in the file makes it decimal.
+    def likely_thousands(self, columns: Sequence[Sequence[str]], mark: str = ".") -> list[tuple[int, str]]:
+        """Return columns in which every number has three digits behind a mark, though nothing in the file makes it decimal.
 
         Args:
             columns: The cells of each column.
+            mark: The mark.
 
         Returns:
-            Position of each such column, and its first number.
+            Position of each such column, and its first number; none where commas separate columns.
         """
         likely = []
-        for i, texts in enumerate(columns):
+        for i, texts in enumerate(columns) if self.comma else ():
             numbers = [text.strip() for text in texts if is_plain_number(text)]
-            if len(numbers) > 1 and "." not in self.seen and all("." in n and _AMBIGUOUS.fullmatch(n) for n in numbers):
+            if len(numbers) > 1 and mark not in self.seen and all(mark in n and _AMBIGUOUS.fullmatch(n) for n in numbers):
                 likely.append((i, numbers[0]))
         return likely
 
@@ -214,6 +217,23 @@ class Cell:
             error = self.refuse(f"{self.shown} may mean {text.replace(mark, '')} or {text.replace(mark, '.')}{remedy}")
             error.fault_key = (self.file, self.column, "thousands")
             raise error
+
+
+def remark_on_thousands(file: str, headings: Sequence[str], thousands: Sequence[tuple[int, str]]) -> tuple[str, ...]:
+    """Return the remark on columns that are read with decimals, although they may hold thousands; none without any.
+
+    Args:
+        file: Name of the file.
+        headings: Heading of each column.
+        thousands: What `Decimals.likely_thousands` gives.
+    """
+    if not thousands:
+        return ()
+    names = listed([shown(headings[i]) for i, _ in thousands])
+    return (
+        f"{file}: every number under {names} {AS_DECIMALS}, as in {shown(thousands[0][1])}, and is read with decimals; "
+        "if these are thousands, write the numbers without that mark.",
+    )
 
 
 def parse_number(text: str, decimal: str) -> float | None:

@@ -66,6 +66,7 @@ _STATED_RATE = re.compile(
     r"(?P<unit>[kM]?Hz|[kM]?S/s|s/s|sps|[mµun]?s\b|sec\w*)?",
     re.IGNORECASE,
 )
+_VICON = ("devices", "trajectories", "model outputs")  # blocks of Vicon Nexus, with the rate [Hz] alone in the next line
 _PERIOD_WORDS = ("interval", "period", "time", "step", "delta_x", "dt", "d_t")
 _PERIOD_UNITS = ("s", "ms", "us", "µs", "ns")
 _RATE_FACTORS = {"khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
@@ -147,7 +148,7 @@ def is_clock(channel: Channel) -> bool:
     a unit of time must also never run backwards.
     """
     factor = _time_factor(channel.unit)
-    forward = len(channel.values) > 1 and never_falls(channel.values)
+    forward = len(channel.values) > 1 and never_falls(channel.values[: _filled_length(channel.values)])
     if names_time(channel.name) and (forward or not _TENSION.fullmatch(channel.name)):
         return not channel.unit or factor is not None
     return factor is not None and forward
@@ -344,8 +345,10 @@ def _positive(value: Any) -> float | None:
 
 def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
     """Return the sampling rate [Hz] that the lines over the data state, and the line; None if none does."""
-    for line in lines:
-        plain = " ".join(line.replace('"', " ").strip(" #%;,\t\r\n").split())
+    plain_lines = [" ".join(line.replace('"', " ").strip(" #%;,\t\r\n").split()) for line in lines]
+    for above, plain in zip(["", *plain_lines], plain_lines, strict=False):
+        if above.lower() in _VICON and plain.isdecimal() and int(plain):
+            return float(plain), f"{above} {plain}"
         match = _STATED_RATE.search(plain)
         if match is None:
             continue

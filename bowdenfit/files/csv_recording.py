@@ -16,7 +16,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import serial_log
-from bowdenfit.files.cells import MISSING
+from bowdenfit.files.cells import MISSING, Cell, Decimals, remark_on_thousands
 from bowdenfit.files.channels import (
     ChannelFile,
     UnreadNames,
@@ -37,7 +37,7 @@ from bowdenfit.files.sheet_columns import (
     read_arrays,
 )
 from bowdenfit.files.sheet_rows import is_summary, refuse_other_separator
-from bowdenfit.files.sheet_text import choose_decimal, explain_lines, split_rows
+from bowdenfit.files.sheet_text import choose_decimal, explain_lines, find_headings_in_comments, split_rows
 from bowdenfit.files.text_file import (
     CsvRecord,
     Line,
@@ -86,6 +86,7 @@ class Sheet:
         metadata: The lines above the data.
         above: Why the other rows above the data are not read, and what they say, by their numbers.
         units: The unit behind each number of a column, by its position; and of a column of units, which holds nothing else.
+        thousands: Columns of which the first rows may hold thousands, and their first number.
     """
 
     encoding: str
@@ -95,6 +96,7 @@ class Sheet:
     metadata: tuple[str, ...]
     above: dict[int, tuple[str, str]]
     units: dict[int, str] = field(default_factory=dict)
+    thousands: Sequence[tuple[int, str]] = ()
 
 
 def read(path: Path) -> ChannelFile:
@@ -136,9 +138,16 @@ def read(path: Path) -> ChannelFile:
     timed, clock = assign_rate_times(channels, sheet.metadata)
     row = count_rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    remarks = (*left_out, *broken, *remark_on_nul_tail(path), *columns.remarks, *clock)
+    thousands = _remark_on_thousands(path.name, sheet, columns)
+    remarks = (*thousands, *left_out, *broken, *remark_on_nul_tail(path), *columns.remarks, *clock)
     whole = make_channel_file(path, "CSV", timed, UnreadNames(), remarks)
     return replace(whole, account=_account_rows(path, sheet, columns, quick, stop))
+
+
+def _remark_on_thousands(file: str, sheet: Sheet, columns: SheetColumns) -> tuple[str, ...]:
+    """Return the remark on columns that may hold thousands; one with a number below 1 holds decimals."""
+    may_be = [(i, text) for i, text in sheet.thousands if (v := columns.values[i]) is not None and not np.any(np.abs(v) < 1)]
+    return remark_on_thousands(file, [sheet.layout.name(i) for i in range(len(columns.values))], may_be)
 
 
 def _read_plain(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
@@ -268,10 +277,27 @@ def read_start(path: Path, data: bytes) -> Sheet:
     reasons = explain_lines([line for line in above if line.row in texts], rows, texts, _COMMENTS)
     layout, units = take_units_from_cells(path.name, layout, rows, units)
     width = len(layout.kinds)
+    thousands = _find_likely_thousands(path.name, layout, rows, separator)
     for line in above:
         if reasons.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width:
             refuse_other_separator(path.name, line.row, line.text.strip(), width, layout.numeric)
-    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), reasons, units)
+    return Sheet(encoding, separator, first.start, layout, tuple(line.text for line in above), reasons, units, thousands)
+
+
+def _find_likely_thousands(file: str, layout: Layout, rows: Sequence[CsvRecord], separator: str) -> list[tuple[int, str]]:
+    """Return columns whose numbers may be thousands by the first rows, as `Decimals.likely_thousands` does.
+
+    Raises:
+        DatasetError: Every number of a column has three digits behind a mark, and others show that the other mark is decimal.
+    """
+    body = [row for row in rows if row.row >= layout.first.row]
+    columns = [[row.cells[i] for row in body if i < len(row.cells)] for i in range(len(layout.kinds))]
+    decimals = Decimals.of((cell for column in columns for cell in column), separator != ",")
+    for mark in ".,":
+        for i, text in decimals.likely_thousands(columns, mark) if decimals.other(mark) else ():
+            row = next(row.row for row in body if i < len(row.cells) and row.cells[i].strip() == text)
+            Cell(file, row, layout.name(i), text, decimals).number()  # refuses what may be either
+    return decimals.likely_thousands(columns)
 
 
 def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:
@@ -291,10 +317,8 @@ def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separato
 
 def _take_headings_from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
     width = len(layout.kinds)
-    for line in reversed([line for line in above if comment_mark(line.text)]):
-        cells = split_cells(line.text.strip().lstrip("#% "), separator)
-        if len(cells) == width and all(cell.strip() for cell in cells):
-            return replace(layout, named=True, headings=tuple(map(heading_of, cells)))
+    if headings := find_headings_in_comments(above, width, separator):
+        return replace(layout, named=True, headings=tuple(map(heading_of, headings.cells)))
     return replace(layout, named=False, headings=tuple(Heading(f"column{i + 1}") for i in range(width)))
 
 

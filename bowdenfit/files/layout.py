@@ -24,6 +24,7 @@ from bowdenfit.files.sheet_rows import (
     is_units,
     is_words,
 )
+from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.text_file import CsvRecord
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
@@ -141,9 +142,16 @@ def _repeats(row: CsvRecord) -> bool:
 
 
 def _completes(above: CsvRecord, names: Sequence[str]) -> bool:
-    """Return whether a row of words that repeat has the only heading of a column, such as the time beside input and output."""
+    """Return whether a row of words has the only heading of a column, such as the time beside input and output.
+
+    Its words repeat, or it has others over the first of several names, as merged cells are exported.
+    """
     alone = [upper for upper, name in zip(above.cells, names, strict=False) if upper.strip() and not name]
-    return _repeats(above) and bool(alone)
+    groups = [upper for upper, name in zip(above.cells, names, strict=False) if upper.strip() and name]
+    is_quantity = any(heading_of(upper).unit or parse_heading(upper) or names_time(upper) for upper in alone)
+    written = [name.lower() for name in names if name]
+    is_merged = is_words(above) and is_quantity and 0 < len(groups) < len(written) == len(set(written))
+    return bool(alone) and (_repeats(above) or is_merged)
 
 
 def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:
@@ -247,7 +255,8 @@ def find_layout(rows: Sequence[CsvRecord], decimal: str, place: str) -> Layout |
     data = _rows_of_data(filled, headings, decimal)
     if not data:
         return None
-    if headings and _can_head(headings.header, sorted(map(_filled_width, data))[len(data) // 2]):
+    width = sorted(map(_filled_width, data))[len(data) // 2]
+    if headings and _can_head(headings.header, width) and not _is_message(headings.rows[-1], width, filled, data[0]):
         refuse_readings_above(filled, headings, place, _MOST_NUMBERS_OVER)
     else:
         headings, data = _find_numeric_headings(filled, data, decimal, place)
@@ -275,7 +284,10 @@ def _rows_of_data(filled: Sequence[CsvRecord], headings: Headings | None, decima
     above = headings.rows[-1].row if headings else 0
     below = [row for row in filled if row.row > above and not is_summary(row.cells)]
     data = [row for row in below if _holds_data(row, decimal)]
-    return [row for row in below if row.row <= data[-1].row] if headings and data else data
+    if not (headings and data):
+        return data
+    first = next(row.row for row in below if row.row == data[0].row or count_words_and_numbers(row) != (1, 0))
+    return [row for row in below if first <= row.row <= data[-1].row]
 
 
 def _find_numeric_headings(
@@ -319,6 +331,11 @@ def _kinds_of_columns(data: Sequence[CsvRecord], decimal: str) -> tuple[Kind, ..
 def _can_head(row: CsvRecord, width: int) -> bool:
     """Return whether a row can stand over that many columns: metadata have two cells, headings about as many as the data."""
     return len(row.cells) * 2 >= width and (width == 1 or len(row.cells) > 1)
+
+
+def _is_message(row: CsvRecord, width: int, filled: Sequence[CsvRecord], first: CsvRecord) -> bool:
+    """Return whether words over the data are no headings, as boot lines: they have fewer cells, and other words are between."""
+    return _filled_width(row) < width and any(row.row < other.row < first.row for other in filled)
 
 
 def _filled_width(row: CsvRecord) -> int:

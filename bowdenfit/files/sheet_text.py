@@ -14,6 +14,7 @@ from bowdenfit.files.text_file import (
     comment_mark,
     declared_separator,
     is_blank,
+    split_cells,
     split_records,
 )
 
@@ -57,7 +58,7 @@ def explain_lines(
         row = by_number.get(line.row)
         if line.text.strip().strip('"').lower().startswith("sep="):
             reasons[line.row] = _SEPARATOR, ""
-        elif _is_comment(line, comments):
+        elif _is_comment(line, comments) and row is None:
             reasons[line.row] = COMMENT, ""
         elif is_blank(line.text) or (row and row.blank):
             reasons[line.row] = BLANK, ""
@@ -66,6 +67,21 @@ def explain_lines(
         elif row is None:
             reasons[line.row] = _CONTINUED, ""
     return reasons
+
+
+def find_headings_in_comments(lines: Sequence[Line], width: int, separator: str) -> CsvRecord | None:
+    """Return the last comment of some lines that has a name for each column; None without one.
+
+    Args:
+        lines: The lines over the data.
+        width: Number of columns.
+        separator: What separates them.
+    """
+    for line in reversed([line for line in lines if comment_mark(line.text)]):
+        cells = split_cells(line.text.strip().lstrip("#% "), separator)
+        if len(cells) == width and all(cell.strip() for cell in cells):
+            return CsvRecord(line.row, line.start, cells)
+    return None
 
 
 def _is_comment(line: Line, comments: str) -> bool:

@@ -12,7 +12,8 @@ _WORDS = {
     "actuated aktor aktuator drive driving driver moteur actionneur actionnement motriz actuador accionamiento motore "
     "attuatore proximal proximale prossimale prox upstream",
     "output": "output out outlet ausgang aus auslauf sortie salida uscita distal distale dist downstream abtrieb effector tip",
-    "load": "load last charge carga carico weight gewicht poids peso",  # at the output, but only beside the other end
+    "load": "load last charge carga carico weight gewicht poids peso mass masse masa massa hanging hung suspended "
+    "dead",  # at the output, but only beside the other end
     "pull": "pull pulling pulled zug traction tiro tirer effort applied",  # at the input, likewise
     "force": "force forces f kraft zugkraft seilkraft seilspannung fuerza forza t tension tensione spannung",
     "side": "side end seite ende cote extremite bout lado extremo lato estremita",

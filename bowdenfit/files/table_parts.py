@@ -150,7 +150,7 @@ def _numeric_columns(rows: Sequence[CsvRecord]) -> set[int]:
     for row in rows:
         if count_words_and_numbers(row)[1]:
             for i, cell in enumerate(row.cells):
-                if cell.strip() and cell.strip().lower() not in BLANK:
+                if cell.strip() and cell.strip().lower() not in BLANK and not is_summary([cell]):
                     balance[i] = balance.get(i, 0) + (1 if is_measured(cell) else -1)
     return {i for i, excess in balance.items() if excess > 0}
 

@@ -5,14 +5,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError, Faults
-from bowdenfit.files.cells import Cell, Decimals, is_plain_number
+from bowdenfit.files.cells import Cell, Decimals, is_plain_number, remark_on_thousands
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, WORKBOOKS, check_ending, recognize, refuse_sheet
 from bowdenfit.files.headings import heading_of, repeated_heading
 from bowdenfit.files.isolation import LIMITS, call_isolated
+from bowdenfit.files.layout import header_position
 from bowdenfit.files.measured_cells import is_measured, split_measured
 from bowdenfit.files.pivot import unpivot
 from bowdenfit.files.row_account import RowAccount, make_account
-from bowdenfit.files.sheet_text import explain_lines, split_rows
+from bowdenfit.files.sheet_rows import is_words
+from bowdenfit.files.sheet_text import explain_lines, find_headings_in_comments, split_rows
 from bowdenfit.files.table_parts import TableParts, split_table
 from bowdenfit.files.text_file import (
     CsvRecord,
@@ -26,10 +28,8 @@ from bowdenfit.files.text_file import (
 )
 from bowdenfit.files.unit_columns import in_one_unit, join_unit_columns
 from bowdenfit.inputs import refuse_special
-from bowdenfit.words import listed, shown
+from bowdenfit.words import shown
 
-AS_DECIMALS = "has three digits behind its mark"
-"""How a remark on columns that could hold thousands begins, which the page of a fit repeats."""
 _FIRST_BYTES = 1 << 18  # judged: bytes that hold the first rows
 _MOST_COLUMNS = 2000  # judged: tables of forces have some ten; each is compared with every spelling of a heading
 _MOST_CELLS = 150_000  # measured: each takes some 60 us; ring-downs of 50 s at 1 kHz have as many
@@ -144,8 +144,18 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
             )
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    table = make_table(name, all_lines, rows, separator)
+    table = make_table(name, all_lines, _take_headings_from_comments(all_lines, rows, separator), separator)
     return replace(table, remarks=(*table.remarks, *(f"{name}: {remark}" for remark in remark_on_nul_tail(path))))
+
+
+def _take_headings_from_comments(lines: Sequence[Line], rows: list[CsvRecord], separator: str) -> list[CsvRecord]:
+    """Return the rows below the comment that names their columns, where no row of words does."""
+    filled = [row for row in rows if not row.blank]
+    if header_position(filled) is not None:
+        return rows
+    above = [line for line in lines if line.row < filled[0].row]
+    headings = find_headings_in_comments(above, len(filled[0].cells), separator)
+    return [headings, *rows] if headings and is_words(headings) else rows
 
 
 def _refuse_large(path: Path) -> None:
@@ -230,14 +240,9 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
         for i, (heading, unit) in enumerate(zip(header, below, strict=True))
     )
     account = _account(name, lines, rows, parts, len(header))
-    thousands = [] if separator == "," else decimals.likely_thousands([_column(parts.body, i) for i in range(len(header))])
     remarks = tuple(f"{name}: the column behind {shown(heading)} says the unit of each row." for heading in with_units)
-    if thousands:
-        columns = listed([shown(header[i]) for i, _ in thousands])
-        remarks += (
-            f"{name}: every number under {columns} {AS_DECIMALS}, as in {shown(thousands[0][1])}, and is read with decimals; "
-            "if these are thousands, write the numbers without that mark.",
-        )
+    thousands = decimals.likely_thousands([_column(parts.body, i) for i in range(len(header))])
+    remarks += remark_on_thousands(name, header, thousands)
     if long := unpivot(header, units, cells):
         header, units, cells, remarks = long.header, long.units, long.rows, (*remarks, f"{name}: {long.remark}")
     errors = _errors_in_cells(header, cells)

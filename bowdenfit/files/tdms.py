@@ -105,7 +105,7 @@ def _channel(channel: Any, length: int) -> Channel:
     unit = _unit(channel.properties)
     if raw.dtype.kind == "M":
         return Channel(_name(channel), "s", _seconds(raw), start=_unix_time(raw[0]))
-    time = to_floats(channel.time_track()[:length]) if _has_waveform(channel.properties) else None
+    time = _waveform_times(channel.properties, length) if _has_waveform(channel.properties) else None
     start = channel.properties.get("wf_start_time") if time is not None else None
     clock = "" if time is None else _WAVEFORM
     return Channel(_name(channel), unit, to_floats(raw), time, clock, None if start is None else _unix_time(start))
@@ -113,7 +113,12 @@ def _channel(channel: Any, length: int) -> Channel:
 
 def _has_waveform(properties: Mapping[str, Any]) -> bool:
     """Return whether the channel says how its samples follow each other in time."""
-    return properties.get(_WAVEFORM, 0) > 0 and "wf_start_offset" in properties
+    return properties.get(_WAVEFORM, 0) > 0
+
+
+def _waveform_times(properties: Mapping[str, Any], length: int) -> np.ndarray:
+    """Return the time of each sample [s], from the start of the waveform; an offset of 0 may be left out."""
+    return float(properties.get("wf_start_offset", 0.0)) + float(properties[_WAVEFORM]) * np.arange(length)
 
 
 def _unit(properties: Mapping[str, Any]) -> str:

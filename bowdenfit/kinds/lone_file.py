@@ -355,7 +355,8 @@ def understand_recording(
         force = find_channel(file, WANTED[0], sources)
         angle = next(iter(find_angle_channels(file, sources, np.zeros(0) if force is None else force.values)), None)
     kind = next(kind.name for kind in KINDS.values() if kind.takes_channels)
-    columns = tuple(map(_column_of_channel, file.channels))
+    clocks = {channel.clock for channel in file.channels}
+    columns = tuple(_column_of_channel(channel, channel.name in clocks) for channel in file.channels)
     return LoneFile(path, FileKind(kind, why), columns, sources, None, file, angle, sheet)
 
 
@@ -381,9 +382,9 @@ def _find_unit(heading: str, below: str) -> str:
     return (other.unit if other else "") or heading_of(heading, below).unit
 
 
-def _column_of_channel(channel: Channel) -> FileColumn:
-    """Return a channel as a column."""
+def _column_of_channel(channel: Channel, times_others: bool) -> FileColumn:
+    """Return a channel as a column; one that gives others their times is a clock, whatever group stands before its name."""
     unit = channel.unit or heading_of(channel.name).unit
     ends = ["".join(f"{value:.5g}" for value in part) for part in (channel.values[:1], channel.values[-1:])]
-    different = len(channel.values)
-    return FileColumn(channel.name, channel.unit, unit, channel.values, True, is_clock(channel), different, 0, *ends)
+    different, is_time = len(channel.values), times_others or is_clock(channel)
+    return FileColumn(channel.name, channel.unit, unit, channel.values, True, is_time, different, 0, *ends)

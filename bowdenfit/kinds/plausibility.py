@@ -12,7 +12,7 @@ For simulated readings the limits of what a bench shows are wide, and the same f
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import gcd
 from typing import Any
@@ -256,12 +256,11 @@ def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " 
     probabilities = np.ones(compared.read.shape[1])
     for c, read in enumerate(compared.read.T):
         finite = np.isfinite(read) & np.isfinite(compared.along)
-        squares = freedom = 0.0
-        for curve in np.unique(compared.curve[finite]):
-            mask = finite & (compared.curve == curve)
-            points = np.unique(np.column_stack([compared.along[mask], read[mask]]), axis=0)
-            residual, left = _residuals_of_polynomial(*points.T)
-            squares, freedom = squares + residual, freedom + left
+        curves = [finite & (compared.curve == curve) for curve in np.unique(compared.curve[finite])]
+        points = [np.unique(np.column_stack([compared.along[mask], read[mask]]), axis=0) for mask in curves]
+        squares, freedom = _sum_residuals(points, _DEGREE)
+        if freedom < _LEAST_FREEDOM and _are_all_different(points):
+            squares, freedom = _sum_residuals(points, 1)  # three readings in each run leave some about straight lines
         values = np.unique(read[finite])
         if freedom < _LEAST_FREEDOM or len(values) < 2:
             continue
@@ -296,10 +295,22 @@ def find_display_step(values: Vector) -> float:
     return last_digit
 
 
-def _residuals_of_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
-    """Return the sum of squares about a polynomial of x, and its degrees of freedom."""
+def _are_all_different(curves: Sequence[Matrix]) -> bool:
+    """Return whether no two readings of any curves are at the same place, as where loads are not set to chosen values."""
+    places = [place for points in curves for place in points[:, 0].tolist()]
+    return len(set(places)) == len(places)
+
+
+def _sum_residuals(curves: Sequence[Matrix], most: int) -> tuple[float, float]:
+    """Return the sum of squares about a polynomial of each curve of at most some degree, and its degrees of freedom."""
+    parts = [_residuals_of_polynomial(points[:, 0], points[:, 1], most) for points in curves]
+    return float(sum(squares for squares, _ in parts)), float(sum(freedom for _, freedom in parts))
+
+
+def _residuals_of_polynomial(x: Vector, y: Vector, most: int) -> tuple[float, float]:
+    """Return the sum of squares about a polynomial of x of at most some degree, and its degrees of freedom."""
     n_different = len(np.unique(x))
-    degree = min(_DEGREE, n_different - 2) if n_different > 3 else n_different - 1
+    degree = min(most, n_different - 2 if n_different > 3 else n_different - 1)
     width = np.ptp(x)
     design = np.vander((x - x.min()) / width if width > 0 else np.zeros(len(x)), degree + 1)
     fit = np.linalg.lstsq(design, y, rcond=None)[0]

@@ -26,7 +26,9 @@ WANTED = (
 TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of pulleys
 OUTPUT_CLOCK = "output_time"  # of the file of a second logger, where it is called otherwise than that of the first
 RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
-_PATH = re.compile(r"[/.]")
+_SIGNALS = ("V", "mV", "uV", "mV/V", "V/V", "mA", "A")
+_MOST_NEWTONS = float(1 << 17)  # judged: 13 t, which no Bowden cable bears; converters of 24 bits count beyond it
+_PATH = re.compile(r"[/.](?! )")  # "Force / N" has a unit behind its line
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 
 
@@ -133,9 +135,31 @@ def converted(
     """Return values of a channel in the internal unit."""
     sign, unit = stated_unit(file, channel, quantity, source)
     try:
-        return _times(_of_counts(channel, source), sign * conversion_factor(unit, dimension))
+        values = _times(_of_counts(channel, source), sign * conversion_factor(unit, dimension))
     except DatasetError as error:
-        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
+        gain = f" {_describe_gain(quantity, channel)}" if unit in _SIGNALS else ""
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.{gain}") from None
+    if dimension == "force" and values is channel.values and _are_counts(values):
+        raise DatasetError(
+            f"{file.path.name}, channel {shown(channel.name)}: whole numbers up to {np.nanmax(np.abs(values)):.0f} are the "
+            f"counts of a converter, such as an HX711, rather than newtons. {_describe_gain(quantity, channel)}"
+        )
+    return values
+
+
+def _are_counts(forces: np.ndarray) -> bool:
+    """Return whether forces [N] are whole numbers beyond those of any cable, as a converter of 24 bits counts."""
+    some = subsample(forces)
+    some = some[np.isfinite(some)]
+    return len(some) > 0 and float(np.max(np.abs(some))) > _MOST_NEWTONS and bool(np.all(some == np.round(some)))
+
+
+def _describe_gain(quantity: str, channel: Channel) -> str:
+    """Return how to state what one count or volt is worth, and what the cell says without a load."""
+    return (
+        "State what one count or volt is worth, and the reading without a load, in cable.toml (bowdenfit init writes one): "
+        f'channels = {{ {quantity} = {{ name = "{channel.name}", gain = ..., offset = ..., unit = "N" }} }}.'
+    )
 
 
 def _times(values: np.ndarray, factor: float) -> np.ndarray:

@@ -121,6 +121,19 @@ def test_readings_that_are_only_alike_are_never_called_copies_and_most_copies_ar
     assert all(len(hits) > 30 and np.mean(hits) > 0.9 for hits in computed.values()), computed
 
 
+def test_a_pasted_table_of_three_loads_in_each_run_is_said_to_be_where_no_load_repeats():
+    """Three readings show no noise about a curve, and do about a line; the runs of one who sets loads without noise do not."""
+    generator, run = np.random.default_rng(5), np.repeat(np.arange(6), 3)
+    loads = generator.uniform(30, 60, 18)
+    out = (loads * np.exp(-0.3) + 0.2 * generator.standard_normal(18)).round(2)
+    rows = np.column_stack([run, np.ones(18), loads.round(2), out])
+    assert len(describe_copies(compared(np.vstack([rows, rows])))) == 1
+    assert describe_copies(compared(rows)) == []
+    set_loads = np.tile([20.0, 40.0, 60.0], 6)
+    exact = np.column_stack([run, np.ones(18), set_loads, (0.7 * set_loads * (1 + 0.001 * set_loads)).round(2)])
+    assert describe_copies(compared(np.vstack([exact, exact]))) == []
+
+
 def test_readings_without_noise_are_no_copies():
     """Two mountings of a computed bench are the same to the last digit; so are readings of a coarse display."""
     loads = np.repeat(np.array(LOADS), 4)

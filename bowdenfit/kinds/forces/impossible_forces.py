@@ -19,11 +19,10 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.forces.stated_noise import log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.recordings.rope_strokes import OPPOSED
-from bowdenfit.types import Flags, Labels, Vector
+from bowdenfit.types import Flags, Labels, Matrix, Vector
 from bowdenfit.words import percent, shown
 
 FALSE_ALARM = 1e-3  # healthy tables that are refused, at most; held by tests/kinds/forces/test_gained_forces.py
@@ -67,14 +66,32 @@ class LogGains:
     Args:
         log_gain: Logarithm of what each gains: output over input while pulling, input over output while returning [1].
         load: A load whose error has nothing to do with that, such as the sum of both forces where friction is small [N].
-        weight: One over the variance of the log gain, for a noise of 1 N [N^2]; for the stated one where it is stated.
+        variances: Relative variances of its input and its output, one column each, for a noise of 1 N [1/N^2]; for the stated
+            one where it is stated.
+        stroke: 1 while pulling, -1 while returning.
         cell: Number of each reading's run and stroke.
     """
 
     log_gain: Vector
     load: Vector
-    weight: Vector
+    variances: Matrix
+    stroke: Labels
     cell: Labels
+
+    @property
+    def weight(self) -> Vector:
+        """One over the variance of the log gain."""
+        return np.asarray(1 / self.variances.sum(axis=1))
+
+    def standardized(self, off: Vector) -> Vector:
+        """Return how far off readings are, in noises of 1 N, by residuals of log gains [1], or by newtons if that is more.
+
+        A force that is smaller by a factor of 1000 is hardly known by its logarithm, and far from what the other one says.
+        """
+        is_output_low = (off < 0) == (self.stroke > 0)
+        shrunk = np.where(np.column_stack([~is_output_low, is_output_low]), np.exp(-2 * np.abs(off))[:, None], 1.0)
+        in_newtons = -np.expm1(-np.abs(off)) / np.sqrt((self.variances * shrunk).sum(axis=1))
+        return np.asarray(np.maximum(np.abs(off) * np.sqrt(self.weight), in_newtons))
 
 
 def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tuple[Flags, Flags]:
@@ -123,9 +140,7 @@ def flag_outliers(readings: LogGains) -> Flags:
         return np.zeros(len(readings.cell), dtype=bool)
     off, noise, freedom = _residual_scatter(readings)
     limit = _RARER * FALSE_ALARM / len(readings.cell)
-    return np.asarray(
-        (np.abs(off) > np.log(2)) & (_p_value(np.abs(off) * np.sqrt(readings.weight) / noise, freedom) < limit)
-    )
+    return np.asarray((np.abs(off) > np.log(2)) & (_p_value(readings.standardized(off) / noise, freedom) < limit))
 
 
 def _residual_scatter(readings: LogGains) -> tuple[Vector, Vector, Vector]:
@@ -288,9 +303,10 @@ def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, Log
     """Return the numbers of the sliding rows, and what each gains."""
     rows = np.flatnonzero(table.stroke != 0)
     force_in, force_out, stroke = table.input_force[rows], table.output_force[rows], table.stroke[rows]
-    weight = 1 / log_ratio_variance(table.noises(description.sensors.noise_ratio)[rows], force_in, force_out)
+    noises = table.noises(description.sensors.noise_ratio)[rows]
+    variances = (noises / np.column_stack([force_in, force_out])) ** 2
     cell = np.unique(np.column_stack([table.run[rows], stroke]), axis=0, return_inverse=True)[1].ravel()
-    return rows, LogGains(-stroke * np.log(force_in / force_out), force_in + force_out, weight, cell)
+    return rows, LogGains(-stroke * np.log(force_in / force_out), force_in + force_out, variances, stroke, cell)
 
 
 def _allowed_gain(force_in: Vector, force_out: Vector, description: Description) -> Vector:

@@ -12,6 +12,7 @@ from pydantic import Field
 from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
+from bowdenfit.files.cells import AS_DECIMALS
 from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
@@ -237,6 +238,7 @@ def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
     titles = [entry.sheet or "", ""]
     blanked = [MissingCodes(table.missing).blank_samples(read_channels(*pair)) for pair in zip(paths, titles, strict=False)]
     files, remarks = [file for file, _ in blanked], tuple(remark for _, words in blanked for remark in words)
+    remarks += tuple(remark for file in files for remark in file.remarks if AS_DECIMALS in remark)
     rows, *output_rows = (rows_where(file, entry.where) for file in files)
     raw, unit = to_recording(
         rows,

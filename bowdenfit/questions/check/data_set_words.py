@@ -9,8 +9,8 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import ContactSettings, Description, FrictionSetting
 from bowdenfit.display import Block, Preformatted, Title, blocks_of, render_text, separate
+from bowdenfit.files.cells import AS_DECIMALS
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.files.tables import AS_DECIMALS
 from bowdenfit.frames import Frame
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.descriptions import order_groups

@@ -317,6 +317,8 @@ def _describe_table(
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in account.remarks]
         lines += [filled(f"Warning: {sentence}") for sentence in describe_unusable_readings(data)]
+    else:
+        lines += [filled(f"Note: {remark}") for remark in file.table.remarks]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
     return "\n".join([*lines, "", *_describe_lengths(file), *describe_commands(commands, usable)]) + "\n"

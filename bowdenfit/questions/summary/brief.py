@@ -20,6 +20,7 @@ from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
 from bowdenfit.questions.recorded.presliding import estimate_presliding
+from bowdenfit.questions.recorded.recording_caveats import describe_recording_caveats
 from bowdenfit.questions.summary.usable_answers import find_usable_answers
 from bowdenfit.questions.summary.verdict import (
     BETWEEN_MOUNTINGS,
@@ -105,14 +106,15 @@ def _sentences(fit: Record, purpose: Purpose) -> tuple[list[str], list[str]]:
     fit_verdict, name = assess_for(fit, purpose), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
     first, *further = summary_sentences(fit, purpose)
     first = first[0].lower() + first[1:]
+    caveats = [*describe_assumed_decimals(fit.dataset), *describe_recording_caveats(fit)]
     if fit_verdict.trusted:
         # the lengths that are good enough, and the best one
         n_first = 2 if fit.dataset.description.route is not None and purpose == "design" else 0
         answer = [f"{name}: {first}", *further[:n_first], widening_sentence(fit), *further[n_first:]]
-        verdict = [*reasons_to_trust(fit), *describe_assumed_decimals(fit.dataset), suggest_next_step(fit)]
+        verdict = [*reasons_to_trust(fit), *caveats, suggest_next_step(fit)]
     else:
         answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]
-        verdict = [f"What they would say: {first}", *describe_assumed_decimals(fit.dataset)]
+        verdict = [f"What they would say: {first}", *caveats]
     return list(filter(None, answer)), list(filter(None, verdict))
 
 

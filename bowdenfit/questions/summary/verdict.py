@@ -34,6 +34,7 @@ from bowdenfit.questions.identify.judgment import (
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import has_candidates, rests_on_one_mounting
 from bowdenfit.questions.recorded.presliding import describe_wrong_delay
+from bowdenfit.questions.recorded.recording_caveats import describe_distant_delay
 from bowdenfit.questions.summary.curve_departures import describe_refuted_families
 from bowdenfit.questions.summary.usable_answers import UsableAnswers, find_usable_answers
 from bowdenfit.results.record import Record, cached_per_fit
@@ -184,10 +185,11 @@ def assess_fit(fit: Record) -> Verdict:
 
 def _describe_misfits(fit: Record) -> tuple[str, ...]:
     """Describe what the model leaves out: faults of the bench, a wrong delay, and lack of fit."""
+    delays = _sentences(describe_wrong_delay(fit)) + _sentences(describe_distant_delay(fit))
     lack = describe_lack_of_fit(fit)
     if lack and (beyond := errors_beyond_limits(fit)):
         lack += (f"The readings reveal that {listed(beyond)}; correct the readings, or state a limit that the bench keeps.",)
-    return describe_bench_faults(fit.dataset) + _sentences(describe_wrong_delay(fit)) + lack
+    return describe_bench_faults(fit.dataset) + delays + lack
 
 
 def assess_for(fit: Record, purpose: Purpose) -> Verdict:

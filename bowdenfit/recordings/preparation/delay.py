@@ -36,6 +36,7 @@ from bowdenfit.types import ChosenVector, Flags, Labels, Matrix, OtherVector, Ve
 
 RANGE = 0.25  # [s]; judged: filters and buses delay by less, and more would reach over whole strokes
 BEYOND = f"the best fit lies at the end of the range of {RANGE} s that was searched"
+UNKNOWN = "How much later the output channel is than the input channel cannot be known from this recording"
 COMMON_ERROR = 0.0015  # [s]; what is left over the 24 simulated benches (scripts/check_recordings.py simulates others)
 _FRICTIONS = np.linspace(0.3, 1.2, 10)  # of half the width of the loop, which delay and noise make wider: the start of a search
 _COARSE_ROWS = 3  # judged: stretches that the coarse search looks at
@@ -104,7 +105,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
 
 
 def _undetermined(why: str) -> Delay:
-    remark = f"How much later the output channel is than the input channel cannot be known from this recording, because {why}."
+    remark = f"{UNKNOWN}, because {why}."
     return Delay(0.0, float("nan"), float("nan"), f"{remark} No delay was assumed; state one if it is known.", why)
 
 

@@ -79,3 +79,15 @@ def test_forces_from_1_n_to_10_kn_in_one_table_are_not_named_and_one_that_is_200
         (load, out)[generator.integers(2)][generator.integers(n)] *= 20000
         is_refused.append(_is_refused(load, out, stroke))
     assert np.mean(is_refused) > 0.99, np.mean(is_refused)
+
+
+@pytest.mark.parametrize(("stroke", "end"), [(1, "force_out"), (-1, "force_in")])
+def test_a_force_in_kilonewtons_among_newtons_is_named_though_its_logarithm_says_little(tmp_path, refuse, stroke, end):
+    """Noise of 0.1 N would let the logarithm of 0.03 N be anything."""
+    rows = _bench(mountings=7, strokes=(stroke,))
+    wrong = _with_force(rows, end, 4, round(getattr(rows, end)[4] / 1000, 3))
+    assert "forces.csv, row 6: " in (printed := refuse("check", write(tmp_path / "kN", wrong)))
+    assert "off the other readings of its run and stroke by a factor of more than two" in printed
+    bf.check(write(tmp_path / "twin", rows))
+    weak = pull(np.random.default_rng(3), [180.0] * 7, [0.3] * 7, (0.3, 3.0, 30.0), strokes=(stroke,), noise=(0.05, 0.05))
+    bf.check(write(tmp_path / "weak", weak))  # a load of six times the noise is known to no factor of two

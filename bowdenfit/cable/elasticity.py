@@ -15,6 +15,7 @@ from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Trunc
 from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.physics.loop import Rope
 from bowdenfit.physics.stretch import (
+    bedded_share,
     compliance,
     extension,
     mean_tension,
@@ -93,7 +94,7 @@ class Elasticity:
         wrap_angle: Float[Array, "*batch"],
         peak: Float[Array, "*batch"],
     ) -> Float[Array, "*batch"]:
-        r"""Return the stretch seen at the loaded end [mm], :math:`e(\bar T(F, \theta)) + g \theta - \Delta L_0`.
+        r"""Return the stretch seen at the loaded end [mm], :math:`\overline{e(T)} + g \theta - \Delta L_0`.
 
         Args:
             values: Values of the parameters.
@@ -101,8 +102,15 @@ class Elasticity:
             wrap_angle: theta [rad].
             peak: Largest load before, from which the load comes down; the load itself while it grows [N].
         """
-        mean = mean_tension_unloading(load, peak, self.friction_exponent(values, wrap_angle))
-        return self.extension(values, mean) + values[LENGTHENING] * wrap_angle - values[STRETCH_ZERO]
+        exponent = self.friction_exponent(values, wrap_angle)
+        mean = mean_tension_unloading(load, peak, exponent)
+        extended = self._extension_unloading(values, load, peak, exponent, mean)
+        return extended + values[LENGTHENING] * wrap_angle - values[STRETCH_ZERO]
+
+    def _extension_unloading(self, values: Values, load: Array, peak: Array, exponent: Array, mean: Array) -> Array:
+        """Return the extension averaged along a rope with a mean tension that comes down from a peak [mm]."""
+        stiffness, stretch, bedding_load = self.rope(values)
+        return mean / stiffness + stretch * bedded_share(load, peak, exponent, bedding_load)
 
     def stretch_of_rows(self, values: Values, rows: StretchRows) -> Float[Array, " rows"]:
         """Return the same for the rows of a table, friction worked out once for every different wrap angle [mm].
@@ -117,7 +125,7 @@ class Elasticity:
         of_angle = jnp.stack([exponent, mean_tension(unit, exponent), mean_tension(unit, -exponent), lengthened])
         exponents, loading, unloading, lengthened = of_angle @ spread
         mean = mean_tension_from_shares(rows.load, rows.peak, exponents, loading, unloading)
-        return self.extension(values, mean) + lengthened
+        return self._extension_unloading(values, rows.load, rows.peak, exponents, mean) + lengthened
 
     def preload(
         self, values: Values, bend: Float[Array, "*batch"]

@@ -12,7 +12,14 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.physics.stretch import compliance, extension, mean_tension, tension_from_extension
+from bowdenfit.physics.stretch import (
+    compliance,
+    compliance_along,
+    extension,
+    extension_along,
+    mean_tension,
+    tension_from_extension,
+)
 
 # Stiffness k [N/mm], bedding-in stretch d [mm] and load T_c [N] of `bowdenfit.physics.stretch.extension`; None if linear.
 Rope = tuple[Array, Array, Array] | None
@@ -97,10 +104,11 @@ def moving_preload(
 
     A moving loop is as long as it was at rest:
 
-    .. math:: e(\bar T_1) + e(\bar T_2) = 2 e(P)
+    .. math:: \overline{e(T_1)} + \overline{e(T_2)} = 2 e(P)
 
-    with the extension e of `bowdenfit.physics.stretch.extension`. That is concave, so that the tensions of a loaded loop add up
-    to more than 2 P. Continued on as a straight line below T = 0, it says that a side is slack where that is so.
+    with the extension e of `bowdenfit.physics.stretch.extension`, averaged along each side. That is concave, so that the
+    tensions of a loaded loop add up to more than 2 P. Continued on as a straight line below T = 0, it says that a side is slack
+    where that is so.
 
     Args:
         along: Force at the end that friction is counted from, the motor, in the direction of motion [N].
@@ -119,10 +127,13 @@ def _mean_tensions(along: Array, mean: Array, friction_exponent: Array) -> tuple
     return pulling, 2 * mean - pulling, b / a
 
 
-def _lengths(pulling: Array, returning: Array, preload: Array, rope: tuple[Array, Array, Array]) -> Array:
+def _lengths(
+    pulling: Array, returning: Array, preload: Array, friction_exponent: Array, rope: tuple[Array, Array, Array]
+) -> Array:
     """Return by how much both sides are shorter than at rest [mm]."""
     pulled, returned = (
-        extension(jnp.maximum(tension, 0.0), *rope) + jnp.minimum(tension, 0.0) * compliance(jnp.zeros_like(tension), *rope)
+        extension_along(jnp.maximum(tension, 0.0), friction_exponent, rope)
+        + jnp.minimum(tension, 0.0) * compliance(jnp.zeros_like(tension), *rope)
         for tension in (pulling, returning)
     )  # each side of 0 by itself: exponentials far below it would be infinite, and gradients no numbers
     return 2 * extension(preload, *rope) - pulled - returned
@@ -134,8 +145,9 @@ def _moving_preload(along: Any, preload: Any, friction_exponent: Any, *rope: Any
     mean = preload * jnp.ones_like(along * friction_exponent)
     for _ in range(_ITERATIONS):
         pulling, returning, ratio = _mean_tensions(along, mean, friction_exponent)
-        slopes = [compliance(jnp.maximum(tension, 0.0), *rope) for tension in (pulling, returning)]
-        mean += _lengths(pulling, returning, preload, rope) * (1 + ratio) / (2 * (slopes[0] + ratio * slopes[1]))
+        slopes = [compliance_along(jnp.maximum(tension, 0.0), friction_exponent, rope) for tension in (pulling, returning)]
+        shorter = _lengths(pulling, returning, preload, friction_exponent, rope)
+        mean += shorter * (1 + ratio) / (2 * (slopes[0] + ratio * slopes[1]))
     return mean
 
 
@@ -145,7 +157,7 @@ def _implicit(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Arra
     mean = _moving_preload(*primals)
 
     def lengths(mean: Any, along: Any, preload: Any, friction_exponent: Any, *rope: Any) -> Array:
-        return _lengths(*_mean_tensions(along, mean, friction_exponent)[:2], preload, rope)
+        return _lengths(*_mean_tensions(along, mean, friction_exponent)[:2], preload, friction_exponent, rope)
 
     _, by_others = jax.jvp(lambda *others: lengths(mean, *others), primals, tangents)
     _, by_mean = jax.jvp(lambda mean: lengths(mean, *primals), (mean,), (jnp.ones_like(mean),))
@@ -221,11 +233,20 @@ def slack_load(
 ) -> Float[Array, "*batch"]:
     r"""Return the input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`.
 
-    A rope that beds in takes the tension of 2 e(P) in place of 2 P. This holds while moving forward; for the way back use the
-    negative exponent.
+    A rope that beds in takes the mean tension at which its extension is 2 e(P) in place of 2 P. This holds while moving
+    forward; for the way back use the negative exponent.
     """
-    alone = 2 * preload if rope is None else tension_from_extension(2 * extension(preload, *rope), *rope)
+    alone = 2 * preload if rope is None else _mean_tension_alone(2 * extension(preload, *rope), friction_exponent, rope)
     return alone / mean_tension(jnp.ones_like(friction_exponent), friction_exponent)
+
+
+def _mean_tension_alone(extended: Array, friction_exponent: Array, rope: tuple[Array, Array, Array]) -> Array:
+    """Return the mean tension of one sliding side with an extension, by Newton's method from that without friction [N]."""
+    mean = tension_from_extension(extended, *rope) * jnp.ones_like(friction_exponent)
+    for _ in range(_ITERATIONS):
+        missing = extended - extension_along(mean, friction_exponent, rope)
+        mean += missing / compliance_along(mean, friction_exponent, rope)
+    return mean
 
 
 def side_tensions(

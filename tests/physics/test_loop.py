@@ -284,10 +284,22 @@ def test_a_loop_that_turns_inside_its_band_holds_the_output_force():
 # A rope that beds in ------------------------------------------------------------------------------------------------
 
 
-def _random_loops(n, seed=3):
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(60)
+
+
+def _extended_along(mean, exponent, rope):
+    """Extension averaged along a rope by 60 places, where the program takes 4; linear below 0."""
+    places = (NODES[:, None] + 1) / 2
+    shares = np.exp(-exponent * places) / (-np.expm1(-exponent) / exponent)
+    tension = mean * shares
+    bedded = np.where(tension > 0, rope[1] * -np.expm1(-np.maximum(tension, 0) / rope[2]), tension * rope[1] / rope[2])
+    return WEIGHTS / 2 @ (tension / rope[0] + bedded)
+
+
+def _random_loops(n, seed=3, most=1.0):
     """Loops from far stiffer to far softer at low load than the preload, and forces past where a side goes slack."""
     draw = np.random.default_rng(seed)
-    preload, exponent = (np.exp(draw.uniform(*limits, n)) for limits in ((-1, 5), (-4, 1)))
+    preload, exponent = (np.exp(draw.uniform(*limits, n)) for limits in ((-1, 5), (-4, most)))
     rope = np.exp(draw.uniform(1, 6, n)), np.exp(draw.uniform(-4, 1.5, n)), np.exp(draw.uniform(0, 4, n))
     along = draw.uniform(-1.5, 1.5, n) * 2 * preload * exponent / -np.expm1(-exponent)
     return jax.tree.map(jnp.asarray, (along, preload, exponent, rope))
@@ -295,18 +307,18 @@ def _random_loops(n, seed=3):
 
 def _bedded(input_force, preload, exponent, stroke, rope):
     """Output force from the tensions that make the loop as long as it was at rest; 0 for those that would push."""
-    stiffness, bedding_stretch, bedding_load = rope
     pulling, returning = _profile(-stroke * exponent), _profile(stroke * exponent)
 
     def extended(tension):
-        return tension / stiffness + bedding_stretch * (1 - np.exp(-tension / bedding_load))
+        return float(_extended_along(tension, exponent, rope)[0])
 
     def tensions(lower):
         return max(input_force, 0.0) + lower, max(-input_force, 0.0) + lower
 
     def too_long(lower):
         first, other = tensions(lower)
-        return extended(first * pulling[1]) + extended(other * returning[1]) - 2 * extended(preload)
+        at_rest = preload / rope[0] - rope[1] * np.expm1(-preload / rope[2])
+        return extended(first * pulling[1]) + extended(other * returning[1]) - 2 * at_rest
 
     low, other = tensions(brentq(too_long, 0.0, 1e4 * preload, xtol=1e-13) if too_long(0.0) < 0 else 0.0)
     return low * pulling[0] - other * returning[0]
@@ -314,25 +326,21 @@ def _bedded(input_force, preload, exponent, stroke, rope):
 
 @pytest.mark.parametrize("stroke", [1.0, -1.0])
 def test_a_loop_whose_rope_beds_in_is_the_loop_solved_numerically(stroke):
-    along, preload, exponent, rope = _random_loops(60)
+    along, preload, exponent, rope = _random_loops(60, most=0.4)
     loops = zip(*map(np.asarray, (along, preload, exponent)), np.array(rope).T, strict=True)
     expected = [_bedded(f, p, x, stroke, r) for f, p, x, r in loops]
     output = loop_output_force(along, preload, exponent, jnp.asarray(stroke), rope)
-    np.testing.assert_allclose(output, expected, rtol=0, atol=1e-9 * np.max(np.abs(along)))
+    np.testing.assert_allclose(output, expected, rtol=0, atol=2e-6 * np.max(np.abs(along)))
 
 
 def test_of_many_loops_whose_ropes_bed_in_each_is_as_long_as_at_rest():
-    along, preload, exponent, rope = _random_loops(20_000)
+    along, preload, exponent, rope = _random_loops(20_000, most=-0.5)
     mean = np.asarray(moving_preload(along, preload, exponent, rope))
     shares = -np.expm1(-exponent) / exponent, np.expm1(exponent) / exponent
     pulling = shares[0] * (2 * mean + shares[1] * along) / sum(shares)
-
-    def extended(tension):
-        bedded = rope[1] * -np.expm1(-np.maximum(tension, 0) / rope[2])
-        return tension / rope[0] + np.where(tension > 0, bedded, tension * rope[1] / rope[2])
-
-    at_rest = 2 * extended(preload)
-    np.testing.assert_allclose(extended(pulling) + extended(2 * mean - pulling), at_rest, rtol=1e-9)
+    extended = [_extended_along(np.asarray(side), np.asarray(exponent), rope) for side in (pulling, 2 * mean - pulling)]
+    at_rest = 2 * (preload / rope[0] - rope[1] * np.expm1(-preload / rope[2]))
+    np.testing.assert_allclose(sum(extended), at_rest, rtol=1e-8)
     assert np.all(mean >= preload * (1 - 1e-12))
 
 

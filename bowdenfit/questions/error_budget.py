@@ -19,14 +19,19 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.bench_errors import CONTRADICTION, LearnedErrors, learn_errors
-from bowdenfit.inference.draws import for_each_draw, value_function
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.bench_error import STEP, ErrorSource
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
-from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.optimal_length import OptimalLength
-from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
+from bowdenfit.results.record import (
+    OPTIMAL_EFFICIENCY,
+    OPTIMAL_LENGTH,
+    Record,
+    cached_per_fit,
+    optimum_program,
+    values_program,
+)
 from bowdenfit.words import filled, listed, significant, table
 
 _ROUNDING = 1e-6  # of a standard deviation, below which an error does not move an answer
@@ -176,17 +181,11 @@ def with_bench_errors(fit: Record) -> Record:
         return fit
     draws = fit.draws()
     z = draws.flat_z + learned.draw(len(draws.flat_z), fit.provenance.seed) @ learned.moves.T
-    shape, programs = draws.z.shape[:-1], fit.programs
+    shape, optimum = draws.z.shape[:-1], dict[str, np.ndarray]()
     with jax.enable_x64(True):
-        if programs is None or fit.model.is_slow:  # whose programs simulate all readings
-            values = for_each_draw(value_function(fit.model), z.shape[1], run_once=True)(z)
-        else:
-            values = programs.values(z)
-        if programs is None and draws.optimum:
-            program = for_each_draw(make_optimizer(fit.model), z.shape[1], run_once=True)
-            optimum = dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), program(z), strict=True))
-        else:
-            optimum = programs.find_optimum(z) if programs is not None else {}
+        values = values_program(fit)(z)
+        if draws.optimum:
+            optimum = dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), optimum_program(fit)(z), strict=True))
     moved = replace(
         draws,
         z=z.reshape(draws.z.shape),

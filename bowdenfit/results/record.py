@@ -15,7 +15,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
-from bowdenfit.inference.draws import DrawFunction, derived_units, efficiency_at
+from bowdenfit.inference.draws import DrawFunction, derived_units, efficiency_at, for_each_draw, value_function
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.sampler_agreement import SamplerAgreement
@@ -26,6 +26,7 @@ from bowdenfit.results.along_route import (
     compile_along_route,
     compute_along_route,
     draw_new_mounting,
+    make_optimizer,
     summarize_optimum,
 )
 from bowdenfit.results.optimal_length import OptimalLength
@@ -340,3 +341,19 @@ def thinned_parameter_values(fit: Record, n: int) -> dict[str, np.ndarray]:
 def along_route_program(fit: Record) -> DrawFunction:
     """Return the compiled program of `compile_along_route`, from sampling if it is there."""
     return fit.programs.along_route if fit.programs and fit.programs.along_route else compile_along_route(fit.model)
+
+
+@cached_per_fit
+def values_program(fit: Record) -> DrawFunction:
+    """Return the program from many z to named values in shown units, the same for a fit that samples and one read back."""
+    if fit.programs:
+        return fit.programs.values
+    return for_each_draw(value_function(fit.model), fit.model.space.size, run_once=True)
+
+
+@cached_per_fit
+def optimum_program(fit: Record) -> DrawFunction:
+    """Return the program from many z to optimal length and efficiency, the same for a fit that samples and one read back."""
+    if fit.programs and fit.programs.optimum:
+        return fit.programs.optimum
+    return for_each_draw(make_optimizer(fit.model), fit.model.space.size)

@@ -17,7 +17,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.chain import Chain, SamplingRequest
 from bowdenfit.inference.coordinates import Conditional
-from bowdenfit.inference.draws import PREDICTED_GROUPS, compile_replicator, for_each_draw, imply_groups
+from bowdenfit.inference.draws import PREDICTED_GROUPS, compile_replicator, for_each_draw, imply_groups, value_function
 from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.importance import compile_densities
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
@@ -197,7 +197,8 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
     optimum = for_each_draw(make_optimizer(model), model.space.size, beside=beside) if model.description.route else None
     implied = compile_replicator(density, seed, beside)
     along_route = compile_along_route(model, beside) if model.description.route is not None else None
-    return Programs(programs, DrawPrograms(lambda z: implied(z)["values"], implied, along_route, optimum))
+    values = for_each_draw(value_function(model), model.space.size, run_once=True, beside=beside)
+    return Programs(programs, DrawPrograms(values, implied, along_route, optimum))
 
 
 def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:

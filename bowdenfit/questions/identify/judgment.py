@@ -14,7 +14,7 @@ from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.models import Model
 from bowdenfit.questions.identify.answer import GROUPS, Identifiability, describe_precision
-from bowdenfit.results.record import Record, cached_per_fit
+from bowdenfit.results.record import Record, values_program
 from bowdenfit.words import listed, significant
 
 BASIS_DRAWS = "what the fit found"
@@ -78,12 +78,6 @@ def _adjust_for_student(model: Model, covariance: np.ndarray) -> np.ndarray:
         return covariance
     freedom, unit = description.student_degrees_of_freedom, np.eye(len(covariance))
     return np.linalg.inv(freedom / (freedom + 3) * (np.linalg.inv(covariance) - unit) + unit)
-
-
-@cached_per_fit
-def values_program(fit: Record) -> DrawFunction:
-    """Return the program from many z to named values in shown units; a fit that samples has one already."""
-    return fit.programs.values if fit.programs else _compile_values(fit.model)
 
 
 def _compile_values(model: Model) -> DrawFunction:

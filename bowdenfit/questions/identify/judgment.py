@@ -14,7 +14,7 @@ from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.models import Model
 from bowdenfit.questions.identify.answer import GROUPS, Identifiability, describe_precision
-from bowdenfit.results.record import Record, values_program
+from bowdenfit.results.record import Record, cached_per_fit, values_program
 from bowdenfit.words import listed, significant
 
 BASIS_DRAWS = "what the fit found"

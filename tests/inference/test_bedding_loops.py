@@ -42,8 +42,8 @@ def write_bench(folder, newton, noise, seed=1):
     def extension(tension):
         return tension / 50 + 1.2 * (1 - np.exp(-tension / 15))
 
-    def mean(tension, exponent):
-        return np.trapezoid(tension * np.exp(-exponent * along), along)
+    def mean_extension(tension, exponent):
+        return np.trapezoid(extension(tension * np.exp(-exponent * along)), along)
 
     def preload_at(bend):
         return brentq(lambda p: extension(p) - extension(12) - 0.006 * (bend - 90), 0, 500)
@@ -52,7 +52,7 @@ def write_bench(folder, newton, noise, seed=1):
         pulled, returned = (exponent, -exponent) if forward else (-exponent, exponent)
 
         def longer(lower):
-            return extension(mean(drive + lower, pulled)) + extension(mean(lower, returned)) - 2 * extension(preload)
+            return mean_extension(drive + lower, pulled) + mean_extension(lower, returned) - 2 * extension(preload)
 
         lower = brentq(longer, 0, 500) if longer(0) < 0 else 0.0
         return (drive + lower) * np.exp(-pulled) - lower * np.exp(-returned)
@@ -63,7 +63,7 @@ def write_bench(folder, newton, noise, seed=1):
     stretch = []
     for bend in (0, 60, 120, 180):
         for load in (1, 3, 6, 10, 15, 25, 40, 60):
-            length = extension(mean(load, MU * np.deg2rad(bend))) + 0.006 * bend - 0.3
+            length = mean_extension(load, MU * np.deg2rad(bend)) + 0.006 * bend - 0.3
             stretch.append(f"{bend},{newton * load},{length + 0.02 * noise * rng.standard_normal()}")
     preload = [f"{bend},{newton * preload_at(bend) + off(0.3)}" for bend in (0, 45, 90, 135, 180)]
     loop = []

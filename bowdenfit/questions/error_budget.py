@@ -110,6 +110,11 @@ class LearnedError:
         return self.sd < _LEARNED * self.limit_sd
 
     @property
+    def is_off(self) -> bool:
+        """Whether readings show it beyond 3 standard uncertainties, as chance does for one of six in one healthy fit in 60."""
+        return self.is_learned and abs(self.mean) > 3 * self.sd
+
+    @property
     def contradicts_limit(self) -> bool:
         """Whether it is beyond its limit, and chance puts one within it there in fewer than one fit in a hundred."""
         by_chance = CONTRADICTION * np.sqrt(max(self.limit_sd**2 - self.sd**2, 0.0))
@@ -309,7 +314,15 @@ def errors_beyond_limits(fit: Record) -> list[str]:
     return [f"{error}, beyond its limit under [errors]" for error in beyond]
 
 
-def widening_sentence(fit: Record) -> str:
+def bench_sentences(fit: Record) -> list[str]:
+    """Return what the first page says of bench errors: what readings reveal of them for sure, and that they widen an answer."""
+    budget = error_budget(fit)
+    revealed = [str(error) for error in budget.learned if error.is_off] if budget is not None else []
+    sentences = [f"The readings reveal that {listed(revealed)}; the answers are corrected for it."] if revealed else []
+    return [*sentences, *filter(None, [_widening_sentence(fit)])]
+
+
+def _widening_sentence(fit: Record) -> str:
     """Return what the first answer would be that bench errors more than half widen; empty if they do not.
 
     'These intervals include bench errors, mainly wrap angles known to 3 deg or 3 % ([errors] in cable.toml); readings alone

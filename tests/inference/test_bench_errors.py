@@ -90,6 +90,7 @@ def test_a_load_exponent_within_its_stated_limit_is_learned_inside_runs(tmp_path
     fit = bf.fit(path, seed=1, settings=["errors.load_exponent=0.15"])
     exponent = learned(fit, "exponent")
     assert fit.verdict().trusted
+    assert "The readings reveal that the load exponent is -0." in " ".join(str(fit).split())
     assert exponent.mean == pytest.approx(-0.1, abs=3 * exponent.sd) and exponent.is_learned
     assert not bf.fit(path, seed=1, settings=["errors.load_exponent=0.01"]).verdict().trusted
 
@@ -97,6 +98,7 @@ def test_a_load_exponent_within_its_stated_limit_is_learned_inside_runs(tmp_path
 def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):
     path = bench(tmp_path / "bench.csv")
     fit, alone = bf.fit(path, seed=1), bf.fit(path, seed=1, errors="none")
+    assert "reveal" not in str(fit)
     assert fit.verdict().trusted and not any(error.contradicts_limit for error in fit.error_budget.learned)
     moved = with_bench_errors(fit)
     assert with_bench_errors(moved) is moved

@@ -15,7 +15,7 @@ from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.data_set_words import describe_assumed_decimals
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
-from bowdenfit.questions.error_budget import KEY_ROLES, answer_interval, find_optimal_length, widening_sentence
+from bowdenfit.questions.error_budget import KEY_ROLES, answer_interval, bench_sentences, find_optimal_length
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
@@ -110,7 +110,7 @@ def _sentences(fit: Record, purpose: Purpose) -> tuple[list[str], list[str]]:
     if fit_verdict.trusted:
         # the lengths that are good enough, and the best one
         n_first = 2 if fit.dataset.description.route is not None and purpose == "design" else 0
-        answer = [f"{name}: {first}", *further[:n_first], widening_sentence(fit), *further[n_first:]]
+        answer = [f"{name}: {first}", *further[:n_first], *bench_sentences(fit), *further[n_first:]]
         verdict = [*reasons_to_trust(fit), *caveats, suggest_next_step(fit)]
     else:
         answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]

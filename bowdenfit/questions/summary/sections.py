@@ -8,7 +8,7 @@ from bowdenfit.kinds import iterate_tables
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.error_budget import find_optimal_length, widening_sentence
+from bowdenfit.questions.error_budget import bench_sentences, find_optimal_length
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.next.words import TITLE
 from bowdenfit.questions.summary.brief import (
@@ -49,7 +49,7 @@ def answer_section(fit: Record) -> PageSection:
         "trusted": fit_verdict.trusted,
         "doubtful": bool(fit_verdict.doubts) or not (fit_verdict.sampled and fit_verdict.may_be_used_for("design")),
         "first": first,
-        "others": [*others, *filter(None, [widening_sentence(fit)])],
+        "others": [*others, *bench_sentences(fit)],
         "warning": distrust_warning(fit_verdict),
         "why": [reason for reason in (*reasons_to_trust(fit), interval_width_caveat(fit)) if reason]
         if fit_verdict.trusted

@@ -3,11 +3,11 @@ from .data_set_words import Report as Report
 from .data_set_words import check_data_set as check_data_set
 from .data_set_words import describe_data_set as describe_data_set
 from .joined_files import describe_joined_files as describe_joined_files
+from .lone_report import LoneReport as LoneReport
+from .lone_report import describe_lone_table as describe_lone_table
 from .prior_figure import PriorPredictive as PriorPredictive
 from .prior_predictive import check_priors as check_priors
 from .prior_predictive import describe_prior_predictive as describe_prior_predictive
 from .prior_predictive import show_priors as show_priors
-from .single_file import LoneReport as LoneReport
-from .single_file import describe_lone_table as describe_lone_table
 from .single_file import describe_single_file as describe_single_file
 from .single_file import is_single_file as is_single_file

@@ -1,18 +1,14 @@
 """What `bowdenfit check FILE` says of a file alone: what it is, its columns or channels, and the command that fits it."""
 
-import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import cast
+from typing import TypeAlias, cast
 
 import numpy as np
 
 from bowdenfit.dataset import Dataset, is_lone_file, single_file_dataset
-from bowdenfit.display import Block, Display, Preformatted, blocks_of
 from bowdenfit.errors import BowdenfitError, DatasetError
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import Channel, ChannelFile
@@ -20,7 +16,6 @@ from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.formats import TEXT, WORKBOOKS
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
 from bowdenfit.files.isolation import limits_times
-from bowdenfit.frames import FILE, Frame, keyword_of, write_frame
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, make_commands
@@ -38,62 +33,16 @@ from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table, shown
 
+CommandWriter: TypeAlias = Callable[[FitCommand], str]
 _CHOICES = ("noise", "friction", "geometry", "undetected", "errors")  # options that the command repeats
 ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
 _LEFT = ("column", "unit", "read as")  # columns aligned to the left
 _MAX_NAMED = 8  # channels whose first and last sample are named
 _LONG = 50  # rows from which a table beside a clock is meant as a recording; with fewer its clock may say when each was read
 _MOST_NEIGHBORS = 40  # files of a folder that are looked at; a judgement
-_COMMAND = re.compile(r"^  bowdenfit fit .*\n(?:    .*\n)*", re.MULTILINE)
 _MAX_LISTED = 100  # channels that are listed
 _MAX_LENGTH = 60  # characters of a name or unit
 _CHANNEL_HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
-
-
-@dataclass(frozen=True, repr=False)
-class LoneReport(Display):
-    """What a table or recording holds that does not state its wrap angle, as `bowdenfit check FILE` shows it.
-
-    Args:
-        text: The report.
-        is_usable: Whether it can be fitted once the angle is stated.
-    """
-
-    text: str
-    is_usable: bool
-
-
-@blocks_of.register
-def _lone_blocks(report: LoneReport) -> Sequence[Block]:
-    return [Preformatted(report.text)]
-
-
-def describe_lone_table(table: str | Path | Frame, reading: Reading) -> LoneReport:
-    """Describe a file or data frame that does not state its wrap angle.
-
-    Args:
-        table: The file or data frame.
-        reading: Keywords of `bowdenfit.read`.
-
-    Raises:
-        BowdenfitError: It cannot be read, or not with these keywords.
-    """
-    if isinstance(table, str | Path):
-        return LoneReport(*describe_single_file(Path(table), reading))
-    with TemporaryDirectory() as folder:
-        text, is_usable = describe_single_file(write_frame(table, Path(folder)), reading)
-    return LoneReport(_COMMAND.sub(_write_call, text).replace(FILE, "the data frame"), is_usable)
-
-
-def _write_call(command: re.Match[str]) -> str:
-    """Return the call of Python that does what a command does with a data frame."""
-    _, _, _, *words = shlex.split(command[0].replace("\\\n", " "))
-    keywords: dict[str, list[str]] = {}
-    for option, argument in zip(words[::2], words[1::2], strict=True):
-        keywords.setdefault(keyword_of(option), []).append(argument)
-    several = {"columns", "missing", "settings"}
-    stated = [f"{name}={values if name in several else repr(values[0])}" for name, values in keywords.items()]
-    return f"  bf.fit({', '.join(['frame', *stated])})\n"
 
 
 def is_single_file(path: Path) -> bool:
@@ -101,19 +50,22 @@ def is_single_file(path: Path) -> bool:
     return (path.is_file() and path.suffix.lower() != ".toml") or is_lone_file(path)
 
 
-def describe_single_file(path: Path, reading: Reading) -> tuple[str, bool]:
+def describe_single_file(path: Path, reading: Reading, write: CommandWriter | None = None) -> tuple[str, bool]:
     """Describe a file alone and the command that fits it; and return whether it can be fitted as it stands.
 
     Args:
         path: The file.
         reading: Keywords of `bowdenfit.read`; which column of a table or channel of a recording is what among them.
+        write: Writes a command that fits it; `wrap_command` if omitted.
 
     Raises:
         BowdenfitError: The file cannot be read, or not with these keywords.
     """
     with limits_times(reading.get("reading_limit") or 1):
         sheets, reasons = ({}, {}) if reading.get("sheet") else understand_sheets(path)
-        return _describe_workbook(path, sheets, reasons, reading) if sheets or reasons else _describe_sheet(path, reading)
+        if sheets or reasons:
+            return _describe_workbook(path, sheets, reasons, reading)
+        return _describe_sheet(path, reading, write or wrap_command)
 
 
 def _describe_workbook(
@@ -139,7 +91,7 @@ def _describe_workbook(
         lines += ["", "To fit one of them:", *(wrap_command(make_commands(file)[0]) for file in benches.values())]
         return "\n".join(lines) + "\n", False
     chosen = cast(Reading, {**reading, "sheet": next(iter(benches))}) if benches else reading
-    text, is_usable = _describe_sheet(path, chosen)
+    text, is_usable = _describe_sheet(path, chosen, wrap_command)
     return "\n".join([*lines, "", text]), is_usable
 
 
@@ -153,22 +105,23 @@ def _describe_content(file: LoneFile) -> str:
     return counted(rows, "reading" if file.is_bench else "row")
 
 
-def _describe_sheet(path: Path, reading: Reading) -> tuple[str, bool]:
+def _describe_sheet(path: Path, reading: Reading, write: CommandWriter) -> tuple[str, bool]:
     """Describe a file, or one sheet of a workbook; see `describe_single_file`."""
     channels, columns = parse_channels(reading.get("channels", ())), parse_sources(reading.get("columns", ()), "--column")
     file = understand(path, channels, columns, reading.get("missing", ()), sheet=reading.get("sheet") or "")
     if file.recording is not None:
-        return _describe_recording(file, file.recording, reading)
+        return _describe_recording(file, file.recording, reading, write)
     assert file.table is not None
     if file.kind.other:
         backwards = _backward_clock(path)
-        return _describe_table(file, make_commands(file), None, backwards, not backwards), False  # `fit` asks which it is
+        # `fit` asks which it is.
+        return _describe_table(file, make_commands(file), None, backwards, not backwards, write), False
     if file.is_angles and not columns:
         return _describe_angle_table(file), True
-    return _describe_readings(file, reading)
+    return _describe_readings(file, reading, write)
 
 
-def _describe_readings(file: LoneFile, reading: Reading) -> tuple[str, bool]:
+def _describe_readings(file: LoneFile, reading: Reading, write: CommandWriter) -> tuple[str, bool]:
     """Describe a table of readings; and return whether it can be fitted as it stands."""
     (command,) = make_commands(file)
     has_angles = file.has_own_angles(is_stated=False)
@@ -187,7 +140,7 @@ def _describe_readings(file: LoneFile, reading: Reading) -> tuple[str, bool]:
     for name in _CHOICES:
         command = command.with_options(f"--{name}", [value] if (value := reading.get(name)) else [])
     command = command.with_options("--missing", reading.get("missing", ()))
-    return _describe_table(file, [command], data, obstacle, not remaining), not obstacle
+    return _describe_table(file, [command], data, obstacle, not remaining, write), not obstacle
 
 
 def _find_neighbors(path: Path, angles: bool) -> list[Path]:
@@ -246,7 +199,9 @@ def _try_as_data_set(path: Path, reading: Reading, strict: bool) -> tuple[Datase
         return None, str(error)
 
 
-def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading) -> tuple[str, bool]:
+def _describe_recording(
+    file: LoneFile, recording: ChannelFile, reading: Reading, write: CommandWriter
+) -> tuple[str, bool]:
     """Describe a recording alone; and return whether it can be fitted as it stands."""
     (command,) = make_commands(file)
     missing = reading.get("missing", ())
@@ -269,7 +224,7 @@ def _describe_recording(file: LoneFile, recording: ChannelFile, reading: Reading
     lines = [filled(f"{file.name}: {description}, because {file.kind.why} {source}."), ""]
     lines += [*describe_channels(recording), *describe_recorded(recordings, obstacle)]
     lines += [*(note for note in notes if note not in lines), ""]
-    lines += describe_commands([command.with_options("--missing", missing)], usable)
+    lines += describe_commands([command.with_options("--missing", missing)], usable, write)
     lines += ["Several recordings of one cable go into a cable.toml (bowdenfit init)."]
     return "\n".join(lines) + "\n", not obstacle
 
@@ -294,7 +249,12 @@ def _backward_clock(path: Path) -> str:
 
 
 def _describe_table(
-    file: LoneFile, commands: Sequence[FitCommand], data: Dataset | None, obstacle: str, usable: bool = True
+    file: LoneFile,
+    commands: Sequence[FitCommand],
+    data: Dataset | None,
+    obstacle: str,
+    usable: bool,
+    write: CommandWriter,
 ) -> str:
     """Describe a table and how to fit it.
 
@@ -304,6 +264,7 @@ def _describe_table(
         data: The data set that it makes; None if it makes none yet.
         obstacle: Reason why it cannot be fitted, in a sentence.
         usable: Whether the command can fit it as it stands.
+        write: Writes a command.
     """
     assert file.table is not None
     title = f"{file.name}: {_kind_in_words(len(file.table.rows), data)}, because {file.kind.why}."
@@ -321,15 +282,18 @@ def _describe_table(
         lines += [filled(f"Note: {remark}") for remark in file.table.remarks]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
-    return "\n".join([*lines, "", *_describe_lengths(file), *describe_commands(commands, usable)]) + "\n"
+    return "\n".join([*lines, "", *_describe_lengths(file), *describe_commands(commands, usable, write)]) + "\n"
 
 
-def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> list[str]:
+def describe_commands(
+    commands: Sequence[FitCommand], usable: bool = True, write: CommandWriter | None = None
+) -> list[str]:
     """Describe the command, on a line of its own so that it can be pasted, and what it takes for granted.
 
     Args:
         commands: Commands that fit a file; two where it could be either of two kinds.
         usable: Whether it can be fitted as it stands.
+        write: Writes a command; `wrap_command` if omitted.
     """
     lines, when = list[str](), "" if usable else " once that is corrected"
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
@@ -337,7 +301,7 @@ def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> li
             ends = listed([f"the {name}" for name in command.missing])
             lines += [filled(f"No column is left that could be {ends}; add it to the file.")]
             continue
-        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", wrap_command(command)]
+        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", (write or wrap_command)(command)]
         granted = listed([f"that {assumption}" for assumption in command.provided])
         lines += [filled(f"This assumes {granted}; change what is wrong.")] if granted else []
     return lines

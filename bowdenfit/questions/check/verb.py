@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.frames import Frame
     from bowdenfit.questions.check.data_set_words import Report
-    from bowdenfit.questions.check.single_file import LoneReport
+    from bowdenfit.questions.check.lone_report import LoneReport
 
 
 @read_first

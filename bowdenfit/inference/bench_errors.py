@@ -16,7 +16,7 @@ References:
     Kennedy and O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63 (2001), 425.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Problem, noise_scales
 from bowdenfit.inference.solver import ROUGH
-from bowdenfit.kinds.bench_error import ErrorSource, iterate_error_sources
+from bowdenfit.kinds.bench_error import BenchError, ErrorSource, iterate_error_sources
 
 _FREE = 1e-6  # weight of a prior that does not count
 # Standard deviations of the estimate of an error within its limit, beyond which it contradicts that limit: so it is of one of
@@ -62,6 +62,26 @@ class LearnedErrors:
     columns: np.ndarray
     inside: Mapping[str, np.ndarray]
 
+    def mean_of_stated(self, stated: Collection[str]) -> Float[np.ndarray, " errors"]:
+        """Return the posterior mean with errors that the user stated and whose limits it keeps; 0 for the others.
+
+        Args:
+            stated: Keys of `[errors]` that the description states.
+        """
+        keys = [_key_of(step) for source in self.sources for step in source.steps]
+        precision, mean = np.eye(len(keys)) + self.information, np.zeros(len(keys))
+        gradient, included = precision @ self.mean, np.array([key in stated for key in keys])
+        while included.any():
+            covariance = np.linalg.inv(precision[np.ix_(included, included)])
+            mean = np.zeros(len(keys))
+            mean[included] = covariance @ gradient[included]
+            gained = np.sqrt(np.maximum(1 - np.diag(covariance), 0.0))  # standard deviation of the mean before the readings
+            beyond = np.abs(mean[included]) > CONTRADICTION * gained
+            if not beyond.any():
+                return mean
+            included[np.flatnonzero(included)[beyond]] = False
+        return np.zeros(len(keys))
+
     def draw(self, count: int, seed: int) -> Float[np.ndarray, "draws errors"]:
         """Draw errors from their posterior: from rectangular priors (GUM 4.3.7), corrected by what the readings say.
 
@@ -77,6 +97,12 @@ class LearnedErrors:
         values, vectors = np.linalg.eigh(self.information)
         noise = generator.normal(size=prior.shape) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
         return self.mean + (prior + noise) @ self.covariance
+
+
+def _key_of(step: BenchError) -> str:
+    """Return the key of `[errors]` by which the limit of an error is stated."""
+    (name,) = (name for name, value in vars(step).items() if value)
+    return "angle" if name == "angle_offset" else name
 
 
 def learn_errors(posterior: LogDensity, z: np.ndarray) -> LearnedErrors | None:

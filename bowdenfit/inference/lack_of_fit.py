@@ -198,19 +198,22 @@ def _reweigh_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
 
 
 def _correct_bench_errors(basin: Basin, solution: Solution) -> Solution:
-    """Return a solution without what errors of the bench explain of its residuals, as far as their limits let them.
+    """Return a solution without what errors of the bench explain of its residuals, as far as stated limits let them.
 
-    What such an error explains is no lack of fit: the answers include it.
+    What an error explains whose limit the user states is no lack of fit: the answers include it. Usual limits explain nothing
+    here, because another model may be the reason: a curve that cannot follow the angles, or friction that depends on the load.
     """
-    learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end)
+    stated = basin.problem.posterior.model.description.errors.model_fields_set
+    learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end) if stated else None
     if learned is None:
         return solution
-    explained = (learned.columns + solution["jacobian"] @ learned.moves) @ learned.mean
+    mean = learned.mean_of_stated(stated)
+    explained = (learned.columns + solution["jacobian"] @ learned.moves) @ mean
     residuals, start = {}, 0
     for table, of_table in solution["residuals"].items():
         residuals[table] = of_table + explained[start : start + len(of_table)]
         start += len(of_table)
-    inside = {table: columns @ learned.mean for table, columns in learned.inside.items()}
+    inside = {table: columns @ mean for table, columns in learned.inside.items()}
     return solution | {"residuals": residuals, "inside": inside}
 
 

@@ -204,10 +204,13 @@ def by_default(on_body) -> bf.Fit:
 
 @pytest.mark.extended
 def test_the_default_priors_give_the_stated_moments(by_default):
-    """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %."""
+    """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %.
+
+    The best length has tails to both ends of its range, and its mean an error of 0.06 sd, so 0.25 sd.
+    """
     draws = by_default.posterior.values | by_default.posterior.optimum
     for name, (mean, sd) in BY_DEFAULT.items():
-        assert abs(np.mean(draws[name]) - mean) < 0.15 * sd, name
+        assert abs(np.mean(draws[name]) - mean) < (0.25 if name == "optimal_length" else 0.15) * sd, name
         assert abs(np.std(draws[name]) / sd - 1) < 0.25, name
 
 

@@ -157,6 +157,7 @@ def test_no_figure_of_an_answer_is_left_out():
     looked_at = {f"{name}_figure" for names, _ in ANSWERS.values() for name in names} | {"prior_figure"}
     looked_at |= {"compensation_figure", "compensation_traces_figure", "teleoperation_figure"}  # beside their fits
     looked_at |= {"metabolic_figure"}  # beside its study
+    looked_at |= {"likelihood_figure"}  # of a profile or a contour, in tests/questions/identify
     assert looked_at | {f"{name}_figure" for name in FIGURES} == set(FILES)
 
 

@@ -130,9 +130,9 @@ class Cable(Display):
     def _write_tables(self, tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         """Write tables into a folder, and return the description that names them."""
         files = {kind: _write_table(kind, table, folder).name for kind, table in tables.items()}
-        stated = self._stated.get("tables", {})
-        unknown = {kind: settings for kind, settings in stated.items() if kind not in KINDS}  # which are refused by name
-        with_files = unknown | {kind: {**stated.get(kind, {}), "file": file} for kind, file in files.items()}
+        settings = self._stated.get("tables", {})
+        unknown = {kind: keys for kind, keys in settings.items() if kind not in KINDS}  # which are refused by name
+        with_files = unknown | {kind: {**settings.get(kind, {}), "file": file} for kind, file in files.items()}
         return {**self._stated, "tables": with_files}
 
     def sentences(self) -> list[str]:

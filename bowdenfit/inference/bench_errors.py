@@ -30,7 +30,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Problem, noise_scales
 from bowdenfit.inference.solver import ROUGH
-from bowdenfit.kinds.bench_error import BenchError, ErrorSource, iterate_error_sources
+from bowdenfit.kinds.bench_error import ErrorSource, iterate_error_sources
 
 _FREE = 1e-6  # weight of a prior that does not count
 # Standard deviations of the estimate of an error within its limit, beyond which it contradicts that limit: so it is of one of
@@ -62,25 +62,25 @@ class LearnedErrors:
     columns: np.ndarray
     inside: Mapping[str, np.ndarray]
 
-    def mean_of_stated(self, stated: Collection[str]) -> Float[np.ndarray, " errors"]:
-        """Return the posterior mean with errors that the user stated and whose limits it keeps; 0 for the others.
+    def mean_of(self, kinds: Collection[str]) -> Float[np.ndarray, " errors"]:
+        """Return the posterior mean if there are only errors of some kinds, and of these those that keep their limits.
 
         Args:
-            stated: Keys of `[errors]` that the description states.
+            kinds: The kinds, as of `BenchError.kind`.
         """
-        keys = [_key_of(step) for source in self.sources for step in source.steps]
-        precision, mean = np.eye(len(keys)) + self.information, np.zeros(len(keys))
-        gradient, included = precision @ self.mean, np.array([key in stated for key in keys])
+        steps = [step for source in self.sources for step in source.steps]
+        precision = np.eye(len(steps)) + self.information
+        gradient, included = precision @ self.mean, np.array([step.kind in kinds for step in steps])
         while included.any():
             covariance = np.linalg.inv(precision[np.ix_(included, included)])
-            mean = np.zeros(len(keys))
+            mean = np.zeros(len(steps))
             mean[included] = covariance @ gradient[included]
             gained = np.sqrt(np.maximum(1 - np.diag(covariance), 0.0))  # standard deviation of the mean before the readings
             beyond = np.abs(mean[included]) > CONTRADICTION * gained
             if not beyond.any():
                 return mean
             included[np.flatnonzero(included)[beyond]] = False
-        return np.zeros(len(keys))
+        return np.zeros(len(steps))
 
     def draw(self, count: int, seed: int) -> Float[np.ndarray, "draws errors"]:
         """Draw errors from their posterior: from rectangular priors (GUM 4.3.7), corrected by what the readings say.
@@ -99,12 +99,6 @@ class LearnedErrors:
         return self.mean + (prior + noise) @ self.covariance
 
 
-def _key_of(step: BenchError) -> str:
-    """Return the key of `[errors]` by which the limit of an error is stated."""
-    (name,) = (name for name, value in vars(step).items() if value)
-    return "angle" if name == "angle_offset" else name
-
-
 def learn_errors(posterior: LogDensity, z: np.ndarray) -> LearnedErrors | None:
     """Return what readings reveal of the errors of their bench; None where none is left to learn.
 
@@ -117,14 +111,16 @@ def learn_errors(posterior: LogDensity, z: np.ndarray) -> LearnedErrors | None:
         stacked = jnp.concatenate(list(posterior.residuals(z, data).values()))
         return stacked, stacked
 
-    if not _has_errors(posterior):
+    sources = _list_sources(posterior)
+    if not sources:
         return None
     slow, shape = posterior.model.is_slow, jax.ShapeDtypeStruct(z.shape, float)
     program = compile_program(
         jax.jacfwd(residuals, has_aux=True), shape, posterior.data, run_once=not slow, run_often=slow
     )
     free = ~noise_scales(posterior)
-    return _learn(posterior, lambda data: program(z, data), posterior.values(jnp.asarray(z), posterior.data), free * 1.0, z)
+    values = posterior.values(jnp.asarray(z), posterior.data)
+    return _learn(posterior, sources, lambda data: program(z, data), values, free * 1.0, z)
 
 
 def learn_at_minimum(problem: Problem, z: np.ndarray, pinned: np.ndarray) -> LearnedErrors | None:
@@ -135,7 +131,8 @@ def learn_at_minimum(problem: Problem, z: np.ndarray, pinned: np.ndarray) -> Lea
         z: The minimum, noise scales included.
         pinned: Which parameters are pinned besides noise scales.
     """
-    if not _has_errors(problem.posterior) or problem.posterior.data_override is not None:
+    sources = _list_sources(problem.posterior)
+    if not sources or problem.posterior.data_override is not None:
         return None
 
     def evaluate(data: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -144,17 +141,17 @@ def learn_at_minimum(problem: Problem, z: np.ndarray, pinned: np.ndarray) -> Lea
 
     counts = np.where(problem.noise | pinned, 0.0, np.maximum(problem.penalty, _FREE))
     values = problem.posterior.model.space.constrain(jnp.asarray(z))
-    return _learn(problem.posterior, evaluate, values, counts, np.where(problem.penalty > 0, z, 0.0))
+    return _learn(problem.posterior, sources, evaluate, values, counts, np.where(problem.penalty > 0, z, 0.0))
 
 
-def _has_errors(posterior: LogDensity) -> bool:
-    """Return whether there are errors of a bench and measurements that may have them."""
-    sources = iterate_error_sources(posterior.model.description)
-    return bool(posterior.model.measurements.tables) and any(True for _ in sources)
+def _list_sources(posterior: LogDensity) -> tuple[ErrorSource, ...]:
+    """Return the errors of a bench whose measurements are there; none where they are not."""
+    return tuple(iterate_error_sources(posterior.model.description)) if posterior.model.measurements.tables else ()
 
 
 def _learn(
     posterior: LogDensity,
+    sources: tuple[ErrorSource, ...],
     evaluate: Callable[[Any], tuple[Any, Any]],
     values: Mapping[str, Any],
     prior: np.ndarray,
@@ -164,12 +161,12 @@ def _learn(
 
     Args:
         posterior: The posterior.
+        sources: Causes of error.
         evaluate: Returns the Jacobian and the residuals of data of all terms.
         values: Parameters by name [internal units].
         prior: Weight of the prior of each z; 0 for noise scales, which residuals do not determine.
         z: Residuals of these priors.
     """
-    sources = tuple(iterate_error_sources(posterior.model.description))
     jacobian, residuals = (np.nan_to_num(np.asarray(part)) for part in evaluate(posterior.data))
     jacobian = jacobian * (prior > 0)
     inside = {term.name: _inside_runs(term, values) for term in posterior.model.terms}

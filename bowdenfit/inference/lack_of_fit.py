@@ -203,11 +203,11 @@ def _correct_bench_errors(basin: Basin, solution: Solution) -> Solution:
     What an error explains whose limit the user states is no lack of fit: the answers include it. Usual limits explain nothing
     here, because another model may be the reason: a curve that cannot follow the angles, or friction that depends on the load.
     """
-    stated = basin.problem.posterior.model.description.errors.model_fields_set
-    learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end) if stated else None
+    keys = basin.problem.posterior.model.description.errors.model_fields_set
+    learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end) if keys else None
     if learned is None:
         return solution
-    mean = learned.mean_of_stated(stated)
+    mean = learned.mean_of({"angle_offset" if key == "angle" else key for key in keys})
     explained = (learned.columns + solution["jacobian"] @ learned.moves) @ mean
     residuals, start = {}, 0
     for table, of_table in solution["residuals"].items():

@@ -36,6 +36,12 @@ class BenchError:
     wear: float = 0.0
     load_exponent: float = 0.0
 
+    @property
+    def kind(self) -> str:
+        """Name of the field of an error that is of one kind only."""
+        (name,) = (name for name, value in vars(self).items() if value)
+        return name
+
     def apply_to_force(self, output_force: Vector, stroke: Vector | Labels | float = 1.0) -> Vector:
         """Return output forces [N], or efficiencies, as the bench would read them.
 
@@ -75,7 +81,7 @@ def order_of(number: Labels, count: int) -> Vector:
         number: Number of each, from 0.
         count: How many there are.
     """
-    return number / max(count - 1, 1) - 0.5 if count > 1 else np.zeros(len(number))
+    return number / (count - 1) - 0.5 if count > 1 else np.zeros(len(number))
 
 
 @dataclass(frozen=True)

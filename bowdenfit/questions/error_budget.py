@@ -235,8 +235,7 @@ def _list_learned(learned: LearnedErrors) -> tuple[LearnedError, ...]:
     sds, rows = np.sqrt(np.diag(learned.covariance)), []
     steps = [(step, size) for source in learned.sources for step, size in source.steps.items()]
     for (step, size), mean, sd in zip(steps, learned.mean, sds, strict=True):
-        (field,) = (name for name, value in vars(step).items() if value)
-        words, unit, scale = _SHOWN_ERRORS[field]
+        words, unit, scale = _SHOWN_ERRORS[step.kind]
         one_sd = size * STEP * scale
         rows.append(LearnedError(words, unit, -float(mean) * one_sd, float(sd) * one_sd, one_sd))
     return tuple(rows)
@@ -325,7 +324,7 @@ def bench_sentences(fit: Record) -> list[str]:
 def _widening_sentence(fit: Record) -> str:
     """Return what the first answer would be that bench errors more than half widen; empty if they do not.
 
-    'These intervals include bench errors, mainly wrap angles known to 3 deg or 3 % ([errors] in cable.toml); readings alone
+    'These intervals include bench errors, mainly wrap angles known to 3 deg and 3 % ([errors] in cable.toml); readings alone
     say 0.174 to 0.178 for mu.'
     """
     budget = error_budget(fit)

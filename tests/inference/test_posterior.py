@@ -34,13 +34,14 @@ STATED = {
     "optimal_length": (469.7, 4.5),
     "optimal_efficiency": (0.789, 0.008),
 }
-# The same with the default priors, by bowdenfit's NUTS and by its ensembles, 4000 and 6000 effective draws.
+# The same as a user fits, with angles that may depart from their curves: means of NUTS with 6365 effective draws (467.45 mm)
+# and of ensembles with 9933 and 7837 (467.49 and 467.31 mm). Without departures the best length is 468.6 mm.
 BY_DEFAULT = {
-    "mu1": (0.0833, 0.0172),
-    "mu2": (0.1034, 0.0372),
-    "mu3": (0.2202, 0.0348),
-    "optimal_length": (468.5, 8.06),
-    "optimal_efficiency": (0.7895, 0.01367),
+    "mu1": (0.0826, 0.0163),
+    "mu2": (0.1045, 0.0363),
+    "mu3": (0.2210, 0.0331),
+    "optimal_length": (467.4, 7.82),
+    "optimal_efficiency": (0.7890, 0.0130),
 }
 # The priors that this was worked out with, once the defaults.
 FIRST_PRIORS = [
@@ -204,13 +205,10 @@ def by_default(on_body) -> bf.Fit:
 
 @pytest.mark.extended
 def test_the_default_priors_give_the_stated_moments(by_default):
-    """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %.
-
-    The best length has tails to both ends of its range, and its mean an error of 0.06 sd, so 0.25 sd.
-    """
+    """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %."""
     draws = by_default.posterior.values | by_default.posterior.optimum
     for name, (mean, sd) in BY_DEFAULT.items():
-        assert abs(np.mean(draws[name]) - mean) < (0.25 if name == "optimal_length" else 0.15) * sd, name
+        assert abs(np.mean(draws[name]) - mean) < 0.15 * sd, name
         assert abs(np.std(draws[name]) / sd - 1) < 0.25, name
 
 

@@ -18,13 +18,13 @@ PATIENCE = 60_000  # ms; a machine with other work on it loads JAX slowly
 
 
 _SHELL_WORDS = r"""() => {
-  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), faults = [];
   while (texts.nextNode()) {
     const words = texts.currentNode.data, element = texts.currentNode.parentElement;
     if (element.closest("script, style, .equivalent, .toml")) continue;
-    if (/\bbowdenfit [a-z]|Ctrl-C|terminal|(^|[\s(])--[a-z]/.test(words)) found.push(`of a shell: ${words.slice(0, 80)}`);
+    if (/\bbowdenfit [a-z]|Ctrl-C|terminal|(^|[\s(])--[a-z]/.test(words)) faults.push(`of a shell: ${words.slice(0, 80)}`);
   }
-  return found;
+  return faults;
 }"""
 
 

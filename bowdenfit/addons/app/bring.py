@@ -267,14 +267,14 @@ def _show_files(draft: Draft, understanding: Understanding, look_again: Again) -
                     markup(render_section(prose_section("", (), pictures=(sketch,)), {}), "div")
         if len(understanding.files) == 1 or file.name in faults:
             part.props["open"] = True
-    known = {file.path.name for file in understanding.files}
-    for path in [path for path in draft.files if path.name not in known]:
+    names = {file.path.name for file in understanding.files}
+    for path in [path for path in draft.files if path.name not in names]:
         with block("div", "row"):
             text(path.relative_to(draft.folder).as_posix(), "h3", dir="auto")
             _remove_button(draft, path.name, look_again)
     if understanding.left_out:
-        names = listed([shown(name) for name in understanding.left_out])
-        text(f"Left out, because the contents are not what the extension says: {names}.", classes="hint")
+        left_out = listed([shown(name) for name in understanding.left_out])
+        text(f"Left out, because the contents are not what the extension says: {left_out}.", classes="hint")
 
 
 def _remove_button(draft: Draft, name: str, look_again: Again) -> None:

@@ -62,9 +62,7 @@ class TryPage:
             make_model = import_module("bowdenfit.addons.app.trial").TrialModel  # which loads JAX
             self._model: TrialModel = await self._workbench.compute(make_model, self._folder, fit)
         except BowdenfitError as error:
-            self._place.clear()
-            with self._place:
-                refused(str(error))
+            _refuse(self._place, error)
             return
         self._place.clear()
         with self._place:
@@ -82,13 +80,13 @@ class TryPage:
     def _show_sliders(self) -> None:
         """Show a slider for each parameter, the coefficients first."""
         first = [slider for slider in self._model.sliders if slider.is_coefficient] or list(self._model.sliders)
-        others = [slider for slider in self._model.sliders if slider not in first]
+        further = [slider for slider in self._model.sliders if slider not in first]
         for slider in first:
             self._show_slider(slider)
-        if others:
+        if further:
             with block("details"):
                 text("Other parameters", "summary")
-                for slider in others:
+                for slider in further:
                     self._show_slider(slider)
 
     def _show_slider(self, slider: "Slider") -> None:
@@ -215,15 +213,20 @@ class LikelihoodView:
         try:
             sentences, chart = await self._workbench.compute(draw, self._fit, *names)
         except BowdenfitError as error:
-            self._place.clear()
-            with self._place:
-                refused(str(error))
+            _refuse(self._place, error)
             return
         self._place.clear()
         with self._place:
             for sentence in sentences:
                 text(sentence)
             markup(_render_charts("likelihood", [chart]), "div")
+
+
+def _refuse(place: Any, error: BowdenfitError) -> None:
+    """Show why there is no answer, in its place."""
+    place.clear()
+    with place:
+        refused(str(error))
 
 
 def _render_charts(name: str, charts: Sequence[Chart]) -> str:

@@ -51,8 +51,8 @@ def describe_lone_table(table: str | Path | Frame, reading: Reading) -> LoneRepo
 
 def _write_call(command: FitCommand) -> str:
     """Return the call of Python that does what a command does with a data frame."""
-    stated = list[str]()
+    keywords = list[str]()
     for option in dict.fromkeys(name for name, _ in command.options):
         values = list(command.arguments(option))
-        stated.append(f"{keyword_of(option)}={values if option in _LISTS else repr(values[0])}")
-    return f"  bf.fit({', '.join(['frame', *stated])})"
+        keywords.append(f"{keyword_of(option)}={values if option in _LISTS else repr(values[0])}")
+    return f"  bf.fit({', '.join(['frame', *keywords])})"

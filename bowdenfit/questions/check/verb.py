@@ -60,7 +60,7 @@ def describe(
         describe_file = room.describe_joined_files if reading.get("join") else room.describe_single_file
         text, usable = describe_file(dataset, reading)
         return Reply(text, exit_code=0 if usable else DatasetError.exit_code)
-    report = cast("Report", check(dataset, **reading))
+    report = room.check_data_set(dataset, reading)
     text = room.describe_data_set(report)
     if prior_predictive is not None:
         text += room.describe_prior_predictive(room.show_priors(report, prior_predictive))

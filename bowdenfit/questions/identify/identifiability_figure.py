@@ -8,6 +8,7 @@ import numpy as np
 
 from bowdenfit.plots.layout import empty_page, text_width, ticks, wrap_words
 from bowdenfit.plots.style import BLUE, GRAY, LEAST, LIGHT, SMALL, WIDE, in_paper_style
+from bowdenfit.questions.identify.likelihood_figure import HIGHEST_RISE, LEVEL_OF_ONE
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 HEADING = "What the measurements determine"
 _ROW, _TOP, _BOTTOM, _NAMES, _GAP = 0.24, 0.34, 0.5, 1.75, 0.35  # in
 _PROFILE, _PROFILES_IN_ROW = 1.75, 4  # height of a row of profiles [in], and how many are in it
-_RISE_AT_90, _HIGHEST_RISE = 2.71, 12.0  # rise at the ends of a 90 % interval, and the highest shown
 _TICK_GAP = 0.08  # in, between numbers below a profile
 _CELL = 0.24  # in, room that a number in the map takes
 _SMALLEST_WEIGHT = 0.05  # weight below which a cell of the map is left empty
@@ -71,8 +71,8 @@ def draw(identifiability: Identifiability) -> Figure:
 def _draw_profile(axes: Axes, profile: Profile, first: bool) -> None:
     """Draw the rise of the sum of squares; where it stays flat the readings say nothing."""
     axes.plot(profile.values, profile.rise, color=BLUE)
-    axes.axhline(_RISE_AT_90, color=GRAY, linestyle="--", linewidth=0.8)
-    axes.set_ylim(-0.5, _HIGHEST_RISE)
+    axes.axhline(LEVEL_OF_ONE, color=GRAY, linestyle="--", linewidth=0.8)
+    axes.set_ylim(-0.5, HIGHEST_RISE)
     axes.set_xlabel(_shorten_name(profile.name, (WIDE - 0.5) / _PROFILES_IN_ROW, 8))
     width = axes.get_position().width * WIDE
     axes.set_xticks(*ticks(axes.get_xlim(), lambda texts: width / (max(map(text_width, texts)) + _TICK_GAP)))

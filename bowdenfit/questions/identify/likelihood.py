@@ -90,8 +90,8 @@ class LikelihoodContour(Display):
 
     def sentences(self) -> list[str]:
         """Say where the likelihood is highest."""
-        at = np.unravel_index(int(np.nanargmin(self.rise)), self.rise.shape)
-        places = [f"{name} {significant(values[i])}" for name, values, i in zip(self.names, self.values, at, strict=True)]
+        lowest = np.unravel_index(int(np.nanargmin(self.rise)), self.rise.shape)
+        places = [f"{name} {significant(row[i])}" for name, row, i in zip(self.names, self.values, lowest, strict=True)]
         return [f"The likelihood is highest near {listed(places)}."]
 
     def plot(self) -> "Figure":

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LEVEL_OF_ONE = 2.706  # rise of -2 log L at the ends of a 90 % interval: quantile of chi-squared with 1 degree of freedom
 LEVELS_OF_TWO = (2.279, 4.605)  # at the edges of 68 and 90 % regions: with 2 degrees of freedom
 _WIDTH, _HEIGHT, _PANEL = 3.5, 2.9, (0.62, 0.45, 2.7, 2.3)  # in
-_HIGHEST = 12.0  # rise that is drawn
+HIGHEST_RISE = 12.0  # that is drawn; a judgement
 
 
 @in_paper_style
@@ -34,7 +34,7 @@ def draw_profile(name: str, unit: str, values: np.ndarray, rise: np.ndarray) -> 
     axes.plot(values, rise, color=BLUE, label="Others fitted again")
     axes.axhline(LEVEL_OF_ONE, color=GRAY, linestyle="--", linewidth=0.8, label="90 % interval")
     axes.set_xlim(float(values[0]), float(values[-1]))
-    axes.set_ylim(-0.3, min(_HIGHEST, float(np.nanmax(rise)) + 0.5))
+    axes.set_ylim(-0.3, min(HIGHEST_RISE, float(np.nanmax(rise)) + 0.5))
     _label(figure, axes, axis_label(name, unit), "Rise of -2 log L")
     legend_above(figure, [axes], columns=2)
     return figure

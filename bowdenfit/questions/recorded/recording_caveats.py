@@ -62,8 +62,8 @@ def _matters(fit: Record, recordings: list[Recording]) -> bool:
     """Return whether the longest delay that is looked for changes the friction by more than its interval and a tenth."""
     estimates = [fit.least_squares.estimates.get(name) for name in fit.dataset.description.coefficients]
     widths = [(e.upper - e.lower) / 2 / e.value for e in estimates if e is not None and e.value > 0]
-    known = [width for width in widths if np.isfinite(width)]
-    return bool(known) and RANGE * _mean_sensitivity(recordings) > max(min(known), _LEAST_CHANGE)
+    finite = [width for width in widths if np.isfinite(width)]
+    return bool(finite) and RANGE * _mean_sensitivity(recordings) > max(min(finite), _LEAST_CHANGE)
 
 
 def _mean_sensitivity(recordings: list[Recording]) -> float:

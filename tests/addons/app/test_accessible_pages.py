@@ -12,8 +12,8 @@ from offline_browser import browser
 DATASETS = Path(__file__).parents[3] / "datasets"
 _AXE = "axe-core@4.10.2"
 _RUN = """async () => (await axe.run(document, { resultTypes: ["violations"] })).violations
-  .filter(found => ["serious", "critical"].includes(found.impact) || found.id.includes("main"))
-  .map(found => `${found.impact}, ${found.id}: ${found.nodes.map(node => node.html.slice(0, 120)).join(" | ")}`)"""
+  .filter(fault => ["serious", "critical"].includes(fault.impact) || fault.id.includes("main"))
+  .map(fault => `${fault.impact}, ${fault.id}: ${fault.nodes.map(node => node.html.slice(0, 120)).join(" | ")}`)"""
 _FOCUS = """() => {
   const focused = document.activeElement, style = getComputedStyle(focused);
   const isSeen = focused === document.body || (style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1);

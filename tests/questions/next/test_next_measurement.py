@@ -406,13 +406,13 @@ def test_for_the_coefficient_of_the_bracket_edge_the_length_of_least_other_frict
     assert ranking.best.name == "efficiency@480"
 
 
-def test_an_efficiency_is_best_known_by_measuring_it(fit):
+def test_an_efficiency_is_best_known_by_measuring_it(on_body):
+    """By a fit that has converged; by the few draws of a quick one another length may seem better."""
+    fit = bf.fit(on_body, seed=1, figures=False)
     ranking = rank_measurements(fit, "efficiency@500", [f"efficiency@{length}" for length in (430, 470, 500, 530)])
-    sds = {ranked.name: ranked.sd for ranked in ranking.ranked}
-    assert sds["efficiency@500"] < 1.05 * ranking.best.sd  # one at 530 mm may do as well, by the few draws of a quick fit
-    assert sds["efficiency@500"] < min(sds["efficiency@430"], sds["efficiency@470"])
+    assert ranking.best.name == "efficiency@500"
     assert ranking.answer.unit == "points"
-    assert ranking.repeats.sd[-1] < 0.8 * ranking.answer.sd
+    assert ranking.repeats.to_halve(ranking.answer.sd) is not None
 
 
 def test_the_standard_deviation_falls_from_step_to_step_and_with_every_repeat(for_length):

@@ -333,7 +333,7 @@ def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
 
 
 def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_body):
-    monkeypatch.setattr("bowdenfit.questions.check.verb.check", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("bowdenfit.questions.check.check_data_set", lambda *_, **__: 1 / 0)
     for name in [name for name in os.environ if name.startswith(OF_LIBRARIES)]:
         monkeypatch.delenv(name)
     code, _, err = run("check", on_body)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.questions.start.question import Question
 
@@ -86,4 +87,4 @@ class Form:
             options = (("y", "yes"), ("n", "no"))
         hint = question.why or (f"such as {question.example}" if question.example and not options else "")
         choices = () if question.form == "several" else options
-        self.entries.append(FormEntry(key, question.words, typed, hint, choices, fault))
+        self.entries.append(FormEntry(key, page_words(question.words), typed, hint, choices, fault))

@@ -1,6 +1,6 @@
 """`bf.Fit`: a finished fit as users hold it, with a method or attribute for every question, and the answers that it keeps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,7 +16,7 @@ from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.questions.check.words import check_sentences
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.words import comparison_blocks
-from bowdenfit.questions.error_budget import ErrorBudget, error_budget, find_optimal_length
+from bowdenfit.questions.error_budget import ErrorBudget, error_budget, find_optimal_length, with_bench_errors
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,
@@ -89,8 +89,8 @@ class Fit(Record):
 
     @property
     def elastic(self) -> ElasticAnswers:
-        """Answers about stretch, preload and loops at wrap angles."""
-        return elastic_answers(self)
+        """Answers about stretch, preload and loops at wrap angles, from draws that include the errors of the bench."""
+        return elastic_answers(with_bench_errors(self))
 
     @property
     def checks(self) -> Checks | None:
@@ -123,6 +123,18 @@ class Fit(Record):
             UsageError: The description has no route to vary, or there is no posterior.
         """
         return find_optimal_length(self)
+
+    def efficiency(self, lengths: float | Iterable[float] | None = None) -> Efficiencies:
+        """Return the efficiency at values of the route variable, with intervals that include the errors of the bench.
+
+        Args:
+            lengths: Route values; the description's choices if omitted.
+
+        Raises:
+            UsageError: There is no posterior, or a length is no number, or outside the range of the angle curves no wrap
+                angle was measured at it.
+        """
+        return Record.efficiency(with_bench_errors(self), lengths)
 
     def correlation(self) -> "DataFrame":
         """Return the correlations of the draws of all parameters, as a square table.
@@ -288,7 +300,7 @@ def collect_answers(fit: Record) -> dict[str, Any]:
         if (route := fit.dataset.description.route) is not None:
             answers["length"] = serialize(find_optimal_length(fit))
             if route.choices:
-                rows = predict_at_lengths(fit, np.asarray(route.choices), None, "pull")
+                rows = predict_at_lengths(with_bench_errors(fit), np.asarray(route.choices), None, "pull")
                 answers["predict"] = [[length, serialize(row)] for length, row in zip(route.choices, rows, strict=True)]
     return answers
 

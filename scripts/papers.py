@@ -241,8 +241,8 @@ def predict_beyond(place: Path) -> tuple[str, dict[int, str]]:
         The command, and the efficiency in percent at each length, as printed.
     """
     results = str(place / "stated-coefficients")
-    stated = (f"--set=friction.{name}.fixed={value}" for name, value in {"mu1": 0.1, "mu2": 0.17, "mu3": 0.19}.items())
-    bowdenfit("fit", ON_BODY, "--seed", "1", "--errors", "none", "--no-figures", *stated, "-o", results)
+    settings = (f"--set=friction.{name}.fixed={value}" for name, value in {"mu1": 0.1, "mu2": 0.17, "mu3": 0.19}.items())
+    bowdenfit("fit", ON_BODY, "--seed", "1", "--errors", "none", "--no-figures", *settings, "-o", results)
     with (ROOT / ON_BODY / "angles.csv").open(encoding="utf-8") as table:
         rows = {row[0]: row[1:] for row in csv.reader(table)}
     printed = {}

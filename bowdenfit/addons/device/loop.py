@@ -19,6 +19,7 @@ from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.physics.loop import free_motion_loss, slack_load
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.bent_cable import BentCable, has_preload, has_stretch
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load
 from bowdenfit.units import conversion_factor
@@ -77,6 +78,7 @@ def draw_loop(fit: Record, bends: np.ndarray, device: Device | None, preloads: n
         UsageError: Nothing tells the preload of the loop.
         DescriptionError: The radius of the pulley or the scatter of mountings is known neither from the fit nor stated.
     """
+    fit = with_bench_errors(fit)
     draws = fit.draws()
     if not has_preload(fit.model):
         raise UsageError(

@@ -13,6 +13,7 @@ from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers, friction_arm, has_elastic_answers
 from bowdenfit.questions.bends.bent_cable import find_bent_contact
 from bowdenfit.questions.bends.preload_window import PreloadWindow
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import significant
 
@@ -63,7 +64,7 @@ def elastic_overview(fit: Record) -> ElasticOverview | None:
     """Return the answers at the measured wrap angles; None without draws, or of a cable that has none."""
     if fit.sampled is None or not has_elastic_answers(fit):
         return None
-    answers, (arm, unit) = elastic_answers(fit), friction_arm(fit)
+    answers, (arm, unit) = elastic_answers(with_bench_errors(fit)), friction_arm(fit)
     bends, draws, window = answers.usual if has_answers_at_bends(fit) else (np.zeros(0), {}, None)
     scale = {"friction": arm, "efficiency": 100.0}
     rows = tuple(

@@ -29,6 +29,7 @@ from bowdenfit.models import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.bent_cable import BentCable, find_bent_contact, has_stretch
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.export.sensors import SensorErrors, estimate_sensors
 from bowdenfit.questions.predict.measured_range import find_measured_range
 from bowdenfit.results.record import Record
@@ -210,9 +211,10 @@ def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distru
     if draws > available:
         raise UsageError(f"--draws {draws}: this fit has {available} draws; ask for at most that many.")
     table_points, bent = _choose_points(fit, points)
-    middle, refined = _median_load_law(fit), _add_midpoints(table_points.values)
-    mean_tables = _tabulate_draws(fit, refined, bent, middle, np.zeros(available))
-    draw_tables = _tabulate_draws(fit, table_points.values, bent, middle, fit.mounting())
+    with_errors = with_bench_errors(fit)
+    middle, refined = _median_load_law(with_errors), _add_midpoints(table_points.values)
+    mean_tables = _tabulate_draws(with_errors, refined, bent, middle, np.zeros(available))
+    draw_tables = _tabulate_draws(with_errors, table_points.values, bent, middle, with_errors.mounting())
     coarse = {name: values[..., ::2] if values.ndim > 1 else values for name, values in mean_tables.items()}
     levels = [
         *_quantile_levels(coarse, middle),

@@ -78,13 +78,11 @@ def predict(
         stroke: Direction of sliding.
         output_force: Force that is wanted at the load side, such as 100N: what input force gives it.
         quantity: What to predict.
-        wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; or give a contact this one, such as
-            "bracket edge=45deg"; may be repeated.
+        wrap_angles: Predict at this wrap angle instead of a length (90deg), or bend a contact by it ("bracket edge=45deg").
         preload: Preload the cable with this instead of its own, such as 20N.
         friction_limit: Free-motion friction allowed, for the preload window: 50N*mm (or 5N without a pulley radius).
         spring: Stiffness of springs in series, one with each rope, for the stiffness: 5N/mm.
-        contact: Contact that the wrap angles belong to, such as the one a knee bends; the others keep theirs. Predicts the mean
-            over these angles.
+        contact: Contact that the wrap angles belong to, such as the one a knee bends: the mean over them is predicted.
         gait: Table with those wrap angles in a column, a row each, such as those of a stride at equal times.
         gait_column: Its heading, where it is not one that means a wrap angle.
         table: Table with a row for each prediction: length, wrap angles of contacts, input_force or output_force, stroke.
@@ -92,6 +90,9 @@ def predict(
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
+    from bowdenfit.questions.error_budget import with_bench_errors  # here, as a kept answer needs no JAX
+
+    fit = with_bench_errors(fit)
     applied_force, wanted_force = as_pair(input_force), as_pair(output_force)
     pairs = cast("list[tuple[str, NumberWithUnit]]", wrap_angles)
     if table is not None:
@@ -104,7 +105,6 @@ def predict(
     without_route = fit.dataset.description.route is None and fit.model.cable.is_loop
     if not (over_gait or named) and (angles or quantity not in AT_LENGTHS or without_route):
         _refuse_lengths(lengths)
-        fit.draws()
         limit, stiffness = as_pair(friction_limit), as_pair(spring)
         query = room.make_query(fit, angles, applied_force, wanted_force, as_pair(preload), limit, stroke, stiffness)
         return room.Predictions(room.predict_at_wrap_angles(fit, quantity, query))
@@ -259,9 +259,9 @@ VERB = Verb(
     this contact bends, such as over a stride; with moment arms in that file
     (moment_arm_mm) and --input-force, the torque at the joint too.
 
-    The 90 % interval is that of the cable's mean (q05 to q95 with --csv and
-    --json); that of any one mounting also holds the scatter from one mounting of
-    the cable to the next. A note marks what lies outside the lengths, wrap angles
+    The 90 % interval is that of the cable's mean, bench errors included (q05 to q95
+    with --csv and --json); that of any one mounting also holds the scatter from one
+    mounting of the cable to the next. A note marks what lies outside the lengths, wrap angles
     and loads measured, and where no force is left (0 N: the rope is
     slack).
     """,

@@ -72,10 +72,10 @@ def test_parameters_of_a_controller_hold_what_may_be_compensated(fit, tmp_path):
 def test_the_share_keeps_its_risk_over_draws_in_mountings_of_their_own(fit, answer_at_bends):
     bends = np.deg2rad([bend.wrap_angle for bend in answer_at_bends.by_bend])
     draws = draw_loop(fit, bends, read_device(DEVICE), np.ones(1))
-    motor = 0.01 + 2e-3 * 0.8 + 0.0022 * np.random.default_rng(1).standard_normal((len(draws.friction), 1))
+    motors = 0.01 + 2e-3 * 0.8 + 0.0022 * np.random.default_rng(1).standard_normal((40, len(draws.friction), 1))
     for fed in ([bend.scheduled for bend in answer_at_bends.by_bend], [answer_at_bends.fixed.torque] * len(bends)):
-        risk = np.mean(np.any(moves_by_itself(np.array(fed), draws.friction, motor, 1.0), axis=1))
-        assert risk == pytest.approx(0.05, abs=0.012), "another draw of the motor than the answer's own"
+        moves = [np.any(moves_by_itself(np.array(fed), draws.friction, motor, 1.0), axis=1) for motor in motors]
+        assert np.mean(moves) == pytest.approx(0.05, abs=0.012), "other draws of the motor than the answer's own"
     assert answer_at_bends.scheduled.risk <= 0.05
     assert answer_at_bends.fixed.risk <= 0.05
 

@@ -18,6 +18,7 @@ from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.data_set_words import describe_data_set
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.results.record import Draws, Provenance
 
 BENDS = np.deg2rad([0.0, 30.0, 75.0, 120.0, 180.0, 270.0])
@@ -194,7 +195,7 @@ def test_the_best_preload_keeps_the_cable_taut_in_95_of_100_draws(force, limit):
     fit = known_fit(elastic_cable(), spread=0.1, n=400)
     window = fit.elastic.preload_window((0.0, np.pi), force, friction=limit)
     bends, lowest, felt = np.linspace(0.0, np.pi, 25), [], []
-    values = jax.jit(jax.vmap(fit.model.space.constrain))(fit.draws().flat_z)
+    values = jax.jit(jax.vmap(fit.model.space.constrain))(with_bench_errors(fit).draws().flat_z)
     for draws in zip(*(np.asarray(value) for value in values.values()), strict=True):
         v = dict(zip(values, map(float, draws), strict=True))
         rope = (v["stiffness"], v["bedding_stretch"], v["bedding_load"])

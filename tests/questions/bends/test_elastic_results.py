@@ -25,6 +25,7 @@ from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.models import build_model
 from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.questions.calibrate.replicator import replace_data
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, read_bench, replace_readings
 from bowdenfit.questions.summary.brief import summary_text
@@ -137,7 +138,7 @@ def test_efficiency_is_predicted_at_wrap_angles_with_its_own_and_another_preload
     assert code == 0
     rows = table(out)
     assert [float(row["wrap_angle_deg"]) for row in rows] == pytest.approx([90, 180])
-    values = fit.posterior.values
+    values = with_bench_errors(fit).posterior.values
     mu, preload = values["mu"].ravel(), values["preload"].ravel()
     exponent = mu * np.pi / 2
     rope = tuple(jnp.asarray(values[name].ravel()) for name in ("stiffness", "bedding_stretch", "bedding_load"))
@@ -158,7 +159,8 @@ def test_efficiency_is_predicted_at_wrap_angles_with_its_own_and_another_preload
 def test_what_is_felt_is_twice_preload_times_exponent_times_the_radius(fit, folder, run):
     code, out, _ = run("predict", folder, "--quantity", "friction", "--wrap-angle", "90deg", "--csv")
     assert code == 0
-    felt = 2 * fit.posterior.values["preload"] * fit.posterior.values["mu"] * np.pi / 2 * 20
+    draws = with_bench_errors(fit).posterior.values
+    felt = 2 * draws["preload"] * draws["mu"] * np.pi / 2 * 20
     (row,) = table(out)
     assert float(row["friction_N_mm"]) == pytest.approx(np.median(felt), rel=1e-5)
     assert float(row["q95"]) == pytest.approx(np.quantile(felt, 0.95), rel=1e-5)

@@ -9,6 +9,7 @@ import bowdenfit as bf
 from bowdenfit.display import render_text
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import curve_function, for_each_draw
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.predict.predictions import prediction_blocks
 from bowdenfit.results import prediction_angles
 
@@ -22,7 +23,8 @@ def fit(quick_fit):
 
 
 def expected(fit, length, free_deg, edge_deg):
-    """Efficiency of every draw at a length inside the curves, by the capstan equation."""
+    """Efficiency of every draw, bench errors included, at a length inside the curves, by the capstan equation."""
+    fit = with_bench_errors(fit)
     curves = for_each_draw(curve_function(fit.model, np.array([float(length)])), fit.model.space.size)(fit.posterior.flat_z)
     own_angles = np.deg2rad(curves["free_sheath_angle"][:, 0])
     mu1, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu3"))
@@ -90,7 +92,8 @@ def test_a_wrong_angle_of_a_contact_is_refused_in_a_notebook(fit):
 def test_a_prediction_outside_the_curves_is_what_the_measured_angles_say(fit):
     """At 550 mm the angle table has 37 and 100 deg, and the fit expects its reading there by these; the bell said 64 %."""
     row = bf.predict(fit, [550])[0]
-    mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
+    draws = with_bench_errors(fit).posterior.values
+    mu1, mu2, mu3 = (draws[name].ravel() for name in ("mu1", "mu2", "mu3"))
     right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
     assert row["efficiency"] == pytest.approx(np.median(right), abs=5e-4)
     assert row["efficiency"] == pytest.approx(0.680, abs=0.003)
@@ -120,7 +123,8 @@ def test_where_no_angle_was_measured_outside_the_curves_a_prediction_is_refused(
     with pytest.raises(UsageError, match="no wrap angle of 'squeezed sheath' was measured"):
         bf.predict(fit, 560, wrap_angles={FREE: "100deg"})
     (stated_prediction,) = bf.predict(fit, 560, wrap_angles={FREE: "100deg", "squeezed sheath": "37deg"})
-    mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
+    draws = with_bench_errors(fit).posterior.values
+    mu1, mu2, mu3 = (draws[name].ravel() for name in ("mu1", "mu2", "mu3"))
     right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
     assert stated_prediction["efficiency"] == pytest.approx(np.median(right), rel=1e-6)
 

@@ -5,6 +5,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
+from bowdenfit.questions.error_budget import with_bench_errors
 
 pytestmark = pytest.mark.extended
 
@@ -40,14 +41,20 @@ def test_the_figures_of_the_bent_knee_come_out(fit, swing):
     assert "mean over 91 wrap angles of 'bracket edge', 0 to 45 deg" in row["note"]
 
 
+def unbent(fit):
+    """Draws of mu3, and of the efficiency at 470 mm if the bracket edge did not bend the cable; bench errors included."""
+    fit = with_bench_errors(fit)
+    mu = fit.posterior.values["mu3"].ravel()
+    return mu, fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+
+
 def test_the_torque_at_the_joint_is_the_moment_arm_times_what_arrives(fit, tmp_path):
     angles, arms = np.linspace(45, 0, 31), np.linspace(60, 40, 31)
     path = tmp_path / "arms.csv"
     rows = (f"{angle:.6f},{arm:.6f}" for angle, arm in zip(angles, arms, strict=True))
     path.write_text("\n".join(["wrap_angle_deg,moment_arm_mm", *rows]))
     (row,) = bf.predict(fit, [470], contact="bracket edge", gait=path, input_force=(100, "N"))
-    mu = fit.posterior.values["mu3"].ravel()
-    straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+    mu, straight = unbent(fit)
     torque = 0.1 * arms * straight[:, None] * np.exp(-mu[:, None] * np.deg2rad(angles))  # 100 N times mm, in N m
     assert row["torque_N_m"] == pytest.approx(np.median(torque.mean(axis=1)), rel=1e-6)
     assert row["most_torque_N_m_q95"] == pytest.approx(np.quantile(torque.max(axis=1), 0.95), rel=1e-6)
@@ -63,8 +70,7 @@ def test_the_nominal_angle_gives_what_is_predicted_without_a_gait(fit):
 
 
 def test_a_swing_at_even_angles_has_the_mean_of_its_closed_form(fit, swing):
-    mu = fit.posterior.values["mu3"].ravel()
-    straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+    mu, straight = unbent(fit)
     (row,) = bf.predict(fit, [470], contact="bracket edge", gait=swing)
     step = np.exp(-mu * np.deg2rad(0.5))
     mean = straight * (1 - step**91) / (1 - step) / 91  # a geometric series of steps of half a degree
@@ -95,8 +101,7 @@ def test_a_long_gait_is_stood_for_by_its_quantiles(fit, tmp_path):
     angles = 30 + 30 * np.sin(rng.uniform(0, 2 * np.pi, 3000))
     table.write_text("\n".join(["knee (deg)", *(f"{x:.4f}" for x in angles)]))
     (row,) = bf.predict(fit, [470], contact="bracket edge", gait=table, gait_column="knee (deg)")
-    mu = fit.posterior.values["mu3"].ravel()
-    straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
+    mu, straight = unbent(fit)
     mean = straight * sum(np.exp(-mu * angle) for angle in np.deg2rad(angles)) / 3000
     assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-5)
     assert "3000 wrap angles" in row["note"]

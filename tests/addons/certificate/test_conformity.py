@@ -37,6 +37,26 @@ def test_distances_from_a_limit_have_the_probabilities_of_jcgm_106(probability, 
     assert conformance_probability(value + u * GRID, lower) == pytest.approx(float(probability), abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("value", "u", "tolerance", "printed"),
+    [
+        (-5.47, 0.05, ToleranceInterval(upper=-5.40), "0.92"),  # example 1: breakdown voltage of a Zener diode, in V
+        (509.7, 8.6, ToleranceInterval(lower=490.0), "0.99"),  # example 2: burst strength of a container, in kPa
+    ],
+)
+def test_the_examples_of_one_limit_have_the_probabilities_that_jcgm_106_prints(value, u, tolerance, printed):
+    """JCGM 106:2012, 7.4."""
+    assert f"{conformance_probability(value + u * GRID, tolerance):.2f}" == printed
+
+
+def test_the_acceptance_limit_of_the_speed_trap_is_that_of_jcgm_106():
+    """JCGM 106:2012, 8.3.2.3: fined if faster than 100 km/h with a probability of at least 99.9 %; u is 2 % of the speed."""
+    limit = ToleranceInterval(lower=100.0)
+    fined = brentq(lambda speed: conformance_probability(speed + 0.02 * speed * GRID, limit) - 0.999, 101, 120, xtol=1e-6)
+    assert f"{fined:.0f}" == "107"
+    assert decide(106.0, ToleranceInterval(upper=100.0), fined - 100.0) == "conditional fail"
+
+
 def test_the_ball_bearings_of_jcgm_106_have_the_risks_that_another_program_finds():
     """JCGM 106:2012, 9.5.4: radial error motion below 2 um, gamma(4, 4) over the production, u = 0.25 um, risk of 0.1 %.
 

@@ -47,7 +47,10 @@ class TwoCables(Display):
     def section(self) -> PageSection:
         """The same as a part of a page."""
         caption = f"{listed(list(self.names))} on one chart: line, median; band, {WIDE_INTERVAL}, or density of each value."
-        note = "The probability is that of the sign, which is 0.5 where nothing is known of it."
+        note = (
+            "The probability is that of the sign, which is 0.5 where nothing is known of it. It is by the readings alone: "
+            "errors of one bench are in both cables and largely cancel; those of two benches do not, and are left out."
+        )
         picture = Picture("two-cables", TITLE, caption, self.charts, caption, alone=True)
         return prose_section(TITLE, [*self.sentences(), note], pictures=(picture,))
 

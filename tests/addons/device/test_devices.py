@@ -197,7 +197,7 @@ def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     page = json.loads((tmp_path / "answer" / "compensation.json").read_text())
     assert page["fixed"]["torque"] == seen.fixed.torque
     assert len(page["simulated"]["laws"]) == 3
-    assert (tmp_path / "answer" / "compensation.txt").read_text() == text
+    assert (tmp_path / "answer" / "compensation.txt").read_text() == f"{text}\n"
     for file in (compensation_figure, compensation_traces_figure):
         assert_answer_readable(file, seen, "Loop")
 

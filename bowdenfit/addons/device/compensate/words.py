@@ -109,7 +109,7 @@ def _feedback_sentences(answer: Compensation) -> Iterator[str]:
         f"it then oscillates, {'with a hand on the device or without' if gain.with_hand else 'without a hand on the device'}. "
         f"The hand then feels {format_torque(gain.left.median)} of friction{fades}. {_passivity_sentence(gain)} The "
         f"largest gain is {gain.stable.q05:.2g} to {gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of "
-        f"that uncertainty comes from {gain.decided_by}: {_describe_remedy(gain)}."
+        f"that comes from {gain.decided_by}: {_describe_remedy(gain)}."
     )
 
 
@@ -158,10 +158,9 @@ def _preload_sentence(answer: Compensation) -> str:
     if least.preload >= own.preload:
         return f"Less preload than {own.preload:.3g} N would mean less friction to feel, but the loop could be slack at rest."
     return (
-        f"Preloaded with {least.preload:.3g} N instead of {own.preload:.3g} N, a hand feels "
-        f"{format_torque(least.friction.median)} of friction instead of {format_torque(own.friction.median)}, but one side "
-        f"goes slack at {format_torque(least.slack_from.median)} at the motor, not at "
-        f"{format_torque(own.slack_from.median)}."
+        f"With {least.preload:.3g} N of preload instead of {own.preload:.3g} N, friction is "
+        f"{format_torque(least.friction.median)}, not {format_torque(own.friction.median)}, but one side goes slack at "
+        f"{format_torque(least.slack_from.median)} at the motor, not {format_torque(own.slack_from.median)}."
     )
 
 
@@ -201,14 +200,13 @@ def _simulation_sentences(answer: Compensation) -> Iterator[str]:
     if simulation is None:
         return
     means = listed([f"{format_torque(law.mean_torque.median)} {_LAWS[law.name]}" for law in simulation.laws])
-    peaks = listed([format_torque(law.peak_torque.median) for law in simulation.laws])
+    peaks = listed([format_torque(law.peak_torque.median).removesuffix(" N*m") for law in simulation.laws])
     runaways = (
         ""
         if simulation.runaway_share is None
-        else f" Pushed and let go, {percent(simulation.runaway_share, 1)} keep moving on their own."
+        else f" Once pushed, {percent(simulation.runaway_share, 1)} keep moving."
     )
     yield (
-        f"In {simulation.draws} simulated devices, moved at up to {simulation.speed:.2g} rad/s at "
-        f"{simulation.wrap_angle:.4g} deg, a hand feels {means} on average, with peaks of {peaks} where the motion "
-        f"reverses.{runaways}"
+        f"In {simulation.draws} simulations at up to {simulation.speed:.2g} rad/s and {simulation.wrap_angle:.4g} deg, a hand "
+        f"feels {means}, at reversals up to {peaks} N*m.{runaways}"
     )

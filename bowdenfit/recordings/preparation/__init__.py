@@ -45,6 +45,7 @@ _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _MIRRORED = -0.9  # judged: correlation below which the output falls by all that the input rises
 _USUAL_BLOCK = 0.05
 _POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
+_SHARE_OF_PERIOD = 0.25  # judged: delay up to which an output is looked for, over the period; a later one may be an early one
 _ALL = 0.99  # share of a part of the output that lies within the input at every shift
 _LATE = (
     "{0}: the output is {1:.3g} s {2} than the input, which was found from the forces and taken off; the usual causes are a "
@@ -269,12 +270,18 @@ def _delay(raw: RawRecording, cleaned: _Cleaned, common: CommonClock, settings: 
     if raw.loop:
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
     estimate = _estimate_delay(common, settings, slice(None))
-    if late := _find_late_output(raw, common, is_beyond=estimate.reason == BEYOND):
+    is_beyond = estimate.reason.startswith(BEYOND)
+    if late := _find_late_output(raw, common, is_beyond=is_beyond):
         remainder = _estimate_delay(_together(raw, cleaned, settings, late.delay), settings, slice(None))
-        delay = late.delay + remainder.value
-        remark = _LATE.format(raw.name, abs(delay), "later" if delay > 0 else "earlier")
-        return Delay(delay, remainder.sd if remainder.sd > 0 else late.sd, remainder.exponent, remark)
-    return estimate
+        sd = remainder.sd if remainder.sd > 0 else late.sd
+        estimate = Delay(late.delay + remainder.value, sd, remainder.exponent)
+    elif is_beyond and (main := _main_frequency(common)) > 0:
+        further = _estimate_delay(common, settings, slice(None), max(_SHARE_OF_PERIOD / main, RANGE))
+        estimate = further if further.sd > 0 else estimate
+    if abs(estimate.value) <= RANGE:
+        return estimate
+    side = "later" if estimate.value > 0 else "earlier"
+    return replace(estimate, remark=_LATE.format(raw.name, abs(estimate.value), side))
 
 
 def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool) -> LateOutput | None:
@@ -328,10 +335,10 @@ def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay
     return [(float(common.time[part].mean()), _estimate_delay(common, inspected.settings, part)) for part in parts]
 
 
-def _estimate_delay(common: CommonClock, settings: Preparation, part: slice) -> Delay:
+def _estimate_delay(common: CommonClock, settings: Preparation, part: slice, reach: float = RANGE) -> Delay:
     shortest = _USUAL_BLOCK if settings.block == "auto" else _stated_block(settings)
     good = common.fault[part] == GOOD
-    return estimate_delay(common.time[part], common.input_force[part], common.output_force[part], good, shortest)
+    return estimate_delay(common.time[part], common.input_force[part], common.output_force[part], good, shortest, reach)
 
 
 def _stated_block(settings: Preparation) -> float:

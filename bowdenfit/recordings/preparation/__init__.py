@@ -25,6 +25,7 @@ from bowdenfit.recordings.preparation.blocks import (
 )
 from bowdenfit.recordings.preparation.checks import FEWEST_SAMPLES, check_recording, check_sign
 from bowdenfit.recordings.preparation.clock import (
+    DROPOUT,
     GOOD,
     KINDS,
     NO_OVERLAP,
@@ -45,6 +46,7 @@ _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _MIRRORED = -0.9  # judged: correlation below which the output falls by all that the input rises
 _USUAL_BLOCK = 0.05
 _POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
+_MANY_DROPOUTS = 0.01  # share of the samples of a channel from which they are named; a judgement
 _SHARE_OF_PERIOD = 0.25  # judged: delay up to which an output is looked for, over the period; a later one may be an early one
 _ALL = 0.99  # share of a part of the output that lies within the input at every shift
 _LATE = (
@@ -271,7 +273,7 @@ def _delay(raw: RawRecording, cleaned: _Cleaned, common: CommonClock, settings: 
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
     estimate = _estimate_delay(common, settings, slice(None))
     is_beyond = estimate.reason.startswith(BEYOND)
-    if late := _find_late_output(raw, common, is_beyond=is_beyond):
+    if late := _find_late_output(raw, cleaned, common, is_beyond=is_beyond):
         remainder = _estimate_delay(_together(raw, cleaned, settings, late.delay), settings, slice(None))
         sd = remainder.sd if remainder.sd > 0 else late.sd
         estimate = Delay(late.delay + remainder.value, sd, remainder.exponent)
@@ -284,7 +286,9 @@ def _delay(raw: RawRecording, cleaned: _Cleaned, common: CommonClock, settings: 
     return replace(estimate, remark=_LATE.format(raw.name, abs(estimate.value), side))
 
 
-def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool) -> LateOutput | None:
+def _find_late_output(
+    raw: RawRecording, cleaned: _Cleaned, common: CommonClock, *, is_beyond: bool
+) -> LateOutput | None:
     """Return by how much the output is late, if that is more than `estimate_delay` looks for.
 
     Raises:
@@ -294,12 +298,13 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
     is_short = np.ptp(common.time) < 2 * RANGE  # no room for a delay beyond the range
     if is_short or np.count_nonzero(good) < FEWEST_SAMPLES or _is_opposed(common, good):
         return None
-    late = _scan(common, good, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
+    ends = [read_at(channel, common.time)[1] == GOOD for channel in (cleaned.input, cleaned.output)]
+    late = _scan(common, ends, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
     if late is None:
         return None
-    ends = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
-    lasting = slice(*np.searchsorted(common.time, ends).tolist())  # what has a partner with the delay and without
-    if _scan(common, good, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
+    limits = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
+    lasting = slice(*np.searchsorted(common.time, limits).tolist())  # what has a partner with the delay and without
+    if _scan(common, ends, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
         return None  # something else than the delay differs between the parts of the recording
     if late.rival is not None:
         raise DatasetError(
@@ -319,10 +324,10 @@ def _is_opposed(common: CommonClock, good: Flags) -> bool:
     return all(np.ptp(force) > 0 for force in forces) and float(np.corrcoef(*forces)[0, 1]) < _MIRRORED
 
 
-def _scan(common: CommonClock, good: Flags, part: slice, overlap: float) -> ShiftScan:
-    """Compare the input with a part of the output, at every shift."""
-    time, force = common.time, common.output_force
-    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, (good, good[part]), overlap)
+def _scan(common: CommonClock, good: Sequence[Flags], part: slice, overlap: float) -> ShiftScan:
+    """Compare the good samples of the input with those of a part of the output, at every shift."""
+    time, force, both = common.time, common.output_force, (good[0], good[1][part])
+    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, both, overlap)
 
 
 def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay]]:
@@ -399,6 +404,14 @@ def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[st
             before = np.flatnonzero(channel.gap)
             length = float((channel.time[before + 1] - channel.time[before]).sum())
             remarks.append(f"The clock of {name} has {int(channel.gap.sum())} gaps, {length:.3g} s together.")
+        missing = channel.fault == DROPOUT
+        if np.count_nonzero(missing) > _MANY_DROPOUTS * len(missing):
+            first = np.flatnonzero(np.diff(missing, prepend=False) & missing)
+            remarks.append(
+                f"{np.count_nonzero(missing)} samples of {name} are missing, frozen, or jump to one reading and back; they "
+                f"were left out. They are in {len(first)} places, the first at {channel.time[first[0]]:.2f} s (sample "
+                f"{first[0] + 1}). The usual causes are a loose plug and a logger that skips samples."
+            )
     if counts["saturated"]:
         remarks.append(
             f"{counts['saturated']} samples rest at the lowest or the highest reading of a load cell, as of one that is "

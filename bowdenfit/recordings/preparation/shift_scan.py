@@ -21,6 +21,7 @@ _EXPONENTS = np.linspace(0.0, 0.45, 12)  # over the range of log input force; at
 _FINER = np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75])  # of the distance between them
 _STARTS = np.array([-1.0, 0.0, 1.0])  # where in its band the rope may be at the start, in friction exponents
 _LEAST_FORCE = 1e-3  # of the largest, below which a rope is slack
+_HOLE = 0.05  # judged: of a period, from which a hole may hide a turn
 _WILD = 1e-3  # share of the forces at each end that may be spikes
 _MOVES = 0.3  # judged: of the output's variance, which the part in common must have at least
 OVERLAP = 0.5  # judged: share of the shorter recording that must lie within the other
@@ -134,7 +135,8 @@ def scan_shifts(
     x, is_x = _average(input_time, input_force, good[0] if good else None, step)
     y, is_y = _average(output_time, output_force, good[1] if good else None, step)
     log_input = np.log(np.maximum(x, _LEAST_FORCE * np.max(x)))
-    explained = np.zeros(len(x) + len(y) - 1)
+    explained, main = np.zeros(len(x) + len(y) - 1), main_frequency(x, x, 1 / step)
+    is_x = _drop_after_holes(is_x, 1 / (main * step)) if main > 0 else is_x
     reference = _Reference.of(is_x, y, is_y)
     rows = np.repeat(log_input[None], len(_STARTS), axis=0)
     exponents, apart = _EXPONENTS * np.ptp(log_input), np.ptp(log_input) * _EXPONENTS[1]
@@ -149,9 +151,25 @@ def scan_shifts(
     lags = np.arange(len(explained)) - (len(x) - 1)
     common = np.minimum(len(x), len(y) - lags) - np.maximum(0, -lags)
     unexplained = np.where(common >= overlap * min(len(x), len(y)), 1 - explained, 1.0)
-    main = main_frequency(x, x, 1 / step)
     near = max(RANGE, 0.25 / main) if main > 0 else RANGE
     return ShiftScan(input_time[0] - output_time[0] - lags * step, unexplained, near)
+
+
+def _drop_after_holes(is_x: np.ndarray, period: float) -> np.ndarray:
+    """Return weights of the input without the period after each hole in which a turn may be missing.
+
+    Only after a pull and a return does the operator follow the input again, whatever it was led through in the hole.
+
+    Args:
+        is_x: 1 where the input is known.
+        period: Points of a cycle.
+    """
+    edges = np.diff(is_x, prepend=1.0, append=1.0)
+    begins, ends = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
+    kept = is_x.copy()
+    for end in ends[ends - begins > _HOLE * period]:
+        kept[end : end + int(np.ceil(period))] = 0.0
+    return kept
 
 
 def _average(time: OtherVector, force: OtherVector, good: ChosenFlags | None, step: float) -> tuple[Vector, Vector]:

@@ -97,3 +97,13 @@ def test_two_recordings_in_one_file_are_still_named(tmp_path):
     time = np.where(TIME < 24, TIME, TIME - 24)
     with pytest.raises(DatasetError, match="two recordings in one file"):
         read(save(*write(tmp_path / "r.csv", time=time)))
+
+
+def test_swapped_ends_are_named_with_the_channels_to_exchange(tmp_path):
+    path, _, time, forces = write(tmp_path / "r.csv")
+    np.savetxt(path, np.column_stack([time, *forces[::-1]]), "%.7g", ",", header="time_s,Motor (N),Load (N)", comments="")
+    with pytest.raises(DatasetError, match="N above the input force") as refused:
+        bf.read(path, wrap_angle="180deg", channels=["input_force=Motor", "output_force=Load"])
+    assert "exchange them by --channel input_force=Load --channel output_force=Motor" in str(refused.value)
+    right = bf.read(path, wrap_angle="180deg", channels=["input_force=Load", "output_force=Motor"])
+    assert right.measurements.table(Recordings).items[0].strokes.exponent == pytest.approx(EXPONENT, rel=0.03)

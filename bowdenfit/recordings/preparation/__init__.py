@@ -38,7 +38,7 @@ from bowdenfit.recordings.preparation.clock import (
 from bowdenfit.recordings.preparation.delay import BEYOND, RANGE, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import describe_noise, estimate_tare, noise_about_trend
-from bowdenfit.recordings.preparation.shift_scan import OVERLAP, LateOutput, ShiftScan, scan_shifts
+from bowdenfit.recordings.preparation.shift_scan import AS_WELL, OVERLAP, LateOutput, ShiftScan, scan_shifts
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Flags, Vector
 
@@ -299,9 +299,13 @@ def _find_late_output(
     if is_short or np.count_nonzero(good) < FEWEST_SAMPLES or _is_opposed(common, good):
         return None
     ends = [read_at(channel, common.time)[1] == GOOD for channel in (cleaned.input, cleaned.output)]
-    late = _scan(common, ends, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
+    scan = _scan(common, ends, slice(None), OVERLAP)
+    late = scan.late_output(is_beyond=is_beyond)
     if late is None:
         return None
+    swapped = replace(common, input_force=common.output_force, output_force=common.input_force)
+    if AS_WELL * _scan(swapped, ends[::-1], slice(None), OVERLAP).usual < scan.best[1]:
+        return None  # the ends are exchanged, which is refused later
     limits = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
     lasting = slice(*np.searchsorted(common.time, limits).tolist())  # what has a partner with the delay and without
     if _scan(common, ends, lasting, _ALL).late_output(is_beyond=is_beyond) is None:

@@ -78,6 +78,11 @@ class ShiftScan:
         best = int(np.argmin(self.unexplained))
         return float(self.shift[best]), float(self.unexplained[best])
 
+    @property
+    def usual(self) -> float:
+        """What the best shift within the range of `delay` leaves unexplained."""
+        return float(np.min(self.unexplained, where=np.abs(self.shift) <= RANGE, initial=1.0))
+
     def rival(self) -> float | None:
         """Return another shift that fits about as well as the best, with worse ones between them; None if there is none."""
         as_well = self.unexplained < AS_WELL * self.best[1]
@@ -99,7 +104,7 @@ class ShiftScan:
             is_beyond: Whether the delay is known to lie beyond the range, or at its end.
         """
         least = self.best[1]
-        usual = np.min(self.unexplained, where=np.abs(self.shift) <= RANGE, initial=1.0)
+        usual = self.usual
         if least > _FOLLOWED or usual < max((_BETTER if is_beyond else _MUCH_BETTER) * least, _NEGLIGIBLE):
             return None
         as_well = np.flatnonzero(self.unexplained <= np.sqrt(least * usual))

@@ -11,8 +11,8 @@ from typing import Any
 
 from bowdenfit import route_angles
 from bowdenfit.cable.registry import check_names
-from bowdenfit.description import Description
-from bowdenfit.description.file import override
+from bowdenfit.description import Description, QuantityValue
+from bowdenfit.description.file import check_quantities, override
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, Faults, MissingAngleError
 from bowdenfit.files import is_ros2_folder
@@ -193,6 +193,7 @@ def single_file_dataset(
         )
     else:
         angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}
+        check_quantities([("contact 'cable', wrap_angle", QuantityValue(**angle), "angle")], "--wrap-angle")
     raw = {
         "name": printable(path.stem).strip()[:80] or "cable",
         "source": path.name,
@@ -204,7 +205,7 @@ def single_file_dataset(
         recording |= {"sheet": sheet} if sheet else {}
         raw |= {"tables": {kind: {}}, "recording": [recording]}
     described = add_missing_codes(add_columns(override(raw, overrides), columns or {}), missing)
-    return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)
+    return read_dataset(parse_description(described, "--set" if overrides else path.name), path.parent, {}, channels)
 
 
 def read_dataset(

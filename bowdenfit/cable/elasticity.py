@@ -16,8 +16,9 @@ from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.physics.loop import Rope
 from bowdenfit.physics.stretch import (
     bedded_share,
-    compliance,
+    compliance_along,
     extension,
+    extension_along,
     mean_tension,
     mean_tension_from_shares,
     mean_tension_unloading,
@@ -75,9 +76,13 @@ class Elasticity:
         """Return extension of the rope under a tension that is the same all along it [mm]."""
         return extension(tension, *self.rope(values))
 
-    def compliance(self, values: Values, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Return change of the extension with that tension [mm/N]."""
-        return compliance(tension, *self.rope(values))
+    def extension_along(self, values: Values, mean: Array, exponent: Array) -> Array:
+        """Return the extension of the rope while all of it slides, by its mean tension [mm]."""
+        return extension_along(mean, exponent, self.rope(values))
+
+    def compliance_along(self, values: Values, mean: Array, exponent: Array) -> Array:
+        """Return change of that extension with the mean tension [mm/N]."""
+        return compliance_along(mean, exponent, self.rope(values))
 
     def tension(self, values: Values, extended: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Return the tension from the extension [N]; 0 where the rope is slack."""

@@ -87,6 +87,7 @@ def to_recording(
             clocks.get("velocity", np.zeros(0)),
             velocity,
             is_loop,
+            channels=("", "") if channels.torques else (by_quantity["input_force"].name, by_quantity["output_force"].name),
         ),
         unit,
     )

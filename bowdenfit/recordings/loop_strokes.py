@@ -18,7 +18,7 @@ from bowdenfit.recordings.preparation.hysteresis import (
     smooth_input,
     white_noise,
 )
-from bowdenfit.recordings.recording import PULL, Blocks
+from bowdenfit.recordings.recording import PULL, Blocks, describe_exchange
 from bowdenfit.types import Flags, Labels, Vector
 
 _FIT_BLOCKS = 2000  # more than these say no more about the loop
@@ -79,9 +79,11 @@ class LoopStrokes:
 
     Args:
         preload: Preload that the user states, the same at all wrap angles [N].
+        channels: Names of the channels of input and output force; see `RawRecording`.
     """
 
     preload: float | None = None
+    channels: tuple[str, str] = ("", "")
 
     follow = staticmethod(fit_force_loop)
     unusable: ClassVar = (
@@ -104,7 +106,7 @@ class LoopStrokes:
         del velocity
         _check_none_ignored(by_hand, file)
         if not by_hand:
-            _check_ends(loop, file, name)
+            _check_ends(loop, file, name, self.channels)
         _check_moves(loop, file, name)
 
     def estimate(
@@ -193,7 +195,7 @@ def _check_none_ignored(by_hand: Sequence[Phase], file: str) -> None:
         )
 
 
-def _check_ends(fit: Hysteresis, file: str, name: str) -> None:
+def _check_ends(fit: Hysteresis, file: str, name: str, channels: tuple[str, str]) -> None:
     """Refuse channels that are the wrong way round, or of which one counts the other direction as positive."""
     force_in, force_out = fit.force_in, fit.force_out
     if fit.cost < _COST_OF_NOISE:  # it follows to within its noise, which neither could
@@ -207,8 +209,8 @@ def _check_ends(fit: Hysteresis, file: str, name: str) -> None:
     if other.cost < _CLEARLY * fit.cost:
         raise DatasetError(
             f"{file}: in {name!r} the output force is ahead of the input force in the direction of motion, as if the loop "
-            "gained force: it is the input that stands still at reversals. If input and output are swapped, map them the other "
-            "way round, such as --channel input_force=OUTPUT_CHANNEL --channel output_force=INPUT_CHANNEL."
+            "gained force: it is the input that stands still at reversals. If input and output are swapped, "
+            f"{describe_exchange(channels)}."
         )
 
 

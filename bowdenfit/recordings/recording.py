@@ -5,6 +5,7 @@ and what a fit uses (`Recording`: means of short blocks, with the number of samp
 the others).
 """
 
+import shlex
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +14,19 @@ from jaxtyping import Float
 from bowdenfit.types import Flags, Labels, Vector
 
 PULL, RETURN, SWITCH = 1, -1, 0
+
+
+def describe_exchange(channels: tuple[str, str]) -> str:
+    """Return what to do about a recording whose ends are exchanged, as a clause.
+
+    Args:
+        channels: Names of the channels that were taken for the input and the output force; empty if unknown.
+    """
+    if not all(channels):
+        return "exchange the channels of input and output"
+    of_input, of_output = channels
+    options = (shlex.quote(option) for option in (f"input_force={of_output}", f"output_force={of_input}"))
+    return f"exchange them by --channel {' --channel '.join(options)}"
 
 
 @dataclass(frozen=True)
@@ -30,6 +44,7 @@ class RawRecording:
         velocity: Velocity of the rope, positive toward the motor [mm/s], or of the motor [rad/s]; empty without one.
         loop: Whether the forces are those of a pull-pull loop, differences of two tensions: of either sign.
         input_start, output_start: Unix times at which the clocks are 0 [s]; None where they have no dates (`Channel.start`).
+        channels: Names that the channels of input and output force have in the file; empty if not read from one, or torques.
     """
 
     name: str
@@ -43,6 +58,7 @@ class RawRecording:
     loop: bool = False
     input_start: float | None = None
     output_start: float | None = None
+    channels: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from bowdenfit.recordings.preparation.hysteresis import (
     smooth_input,
     white_noise,
 )
-from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
+from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, describe_exchange
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import percent
 
@@ -192,10 +192,12 @@ class RopeStrokes:
     Args:
         gain_sd: Stated standard deviation of the log ratio of both load cells' gains [1].
         fits_offsets: Whether the fit tares the load cells: an offset may put a loop anywhere.
+        channels: Names of the channels of input and output force; see `RawRecording`.
     """
 
     gain_sd: float = 0.0
     fits_offsets: bool = False
+    channels: tuple[str, str] = ("", "")
 
     follow = staticmethod(fit_loop)
     contact = staticmethod(sliding_one_way)
@@ -221,11 +223,16 @@ class RopeStrokes:
         is_swapped = swapped is not None and swapped.cost < _CLEARLY * loop.cost and _has_loop(swapped)
         if another_ratio and not is_swapped:
             raise _explain_other_ratio(loop, file, name)
+        if swapped is not None and is_swapped and not follows:
+            pulled = swapped.state == PULL
+            above = float(np.median((loop.force_out - loop.force_in)[pulled])) if pulled.any() else 0.0
+            raise DatasetError(
+                f"{file}: while the rope of {name!r} is pulled, the output force is {above:.3g} N above the input force, which "
+                "friction cannot do, and at the reversals it is the input that stands still while the output moves; the usual "
+                f"cause is input and output swapped: {describe_exchange(self.channels)}."
+            )
         refuse_dead(loop.force_in, loop.force_out, file, name, loop)
-        swap = (
-            "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
-            "output_force=INPUT_CHANNEL"
-        )
+        swap = f"if the two ends are swapped, {describe_exchange(self.channels)}"
         pulling = velocity > 0
         if pulling.any() and np.median((loop.force_out - loop.force_in)[pulling]) > 0:
             raise DatasetError(
@@ -237,11 +244,6 @@ class RopeStrokes:
                 f"{file}: in {name!r} the output force is above the input force nearly throughout, as in a return stroke "
                 f"alone; {swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its "
                 '[[recording]]: strokes = [{ start = ..., end = ..., stroke = "return" }].'
-            )
-        if is_swapped and not follows:
-            raise DatasetError(
-                f"{file}: at the reversals of {name!r} the input force stands still while the output force moves, which is the "
-                f"wrong way round; {swap}."
             )
 
     def _is_about_another_ratio(self, loop: Hysteresis) -> bool:

@@ -332,6 +332,16 @@ def test_a_table_alone_needs_its_wrap_angle(run, tmp_path):
     assert fit.least_squares.estimates["mu"].value == pytest.approx(-np.log(0.8) / np.pi, rel=1e-4)
 
 
+def test_a_wrong_setting_of_a_lone_table_is_named_as_one(run, tmp_path):
+    table = tmp_path / "bench.csv"
+    table.write_text("input_force_N,output_force_N\n10,7\n20,14\n30,21\n")
+    for setting, words in (("errors.wear=-1", "--set, errors.wear: input"), ("errors.wears=1", "--set: unknown key")):
+        code, _, error = run("check", table, "--wrap-angle", "180deg", "--set", setting)
+        assert code == 2 and words in error
+        code, _, error = run("check", table, "--wrap-angle", "3000deg", "--set", setting)
+        assert code == 2 and "--wrap-angle, contact" in error
+
+
 def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_body):
     monkeypatch.setattr("bowdenfit.questions.check.check_data_set", lambda *_, **__: 1 / 0)
     for name in [name for name in os.environ if name.startswith(OF_LIBRARIES)]:

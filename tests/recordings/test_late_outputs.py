@@ -27,6 +27,21 @@ def test_an_output_that_is_late_by_a_quarter_of_the_period_is_found(wave, load):
     assert "the output is 1.5" in delay.remark and "s later than the input" in delay.remark
 
 
+@pytest.mark.parametrize("bench", [("triangle", 8.0, 0.3), ("sine", 20.0, 0.5), ("random", 4.0, 0.35), ("sine", 8.0, 0.2)])
+def test_an_output_that_is_late_by_a_small_part_of_the_period_is_found(bench):
+    """The search ended at 0.25 s, and a later output left too little unexplained for the scan of all shifts."""
+    wave, period, late = bench
+    for seed in range(3):
+        delay = inspected(seed, wave=wave, period=period, delay=late).delay
+        assert delay.value == pytest.approx(late, abs=0.03) and delay.sd < 0.03
+        assert ("s later than the input" in delay.remark) == (late > 0.25)
+
+
+def test_an_output_that_is_late_by_more_than_a_quarter_of_the_period_is_not_searched_for_there():
+    delay = inspected(wave="sine", period=1.0, noise=0.02, delay=0.45).delay
+    assert delay.value == 0.0 and "the end of the range that was searched" in delay.remark
+
+
 def test_an_input_that_is_late_is_found():
     delay = inspected(wave="chirp", delay=-0.8).delay
     assert delay.value == pytest.approx(-0.8, abs=0.05)

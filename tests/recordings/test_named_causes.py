@@ -61,8 +61,29 @@ def test_zeros_of_a_multiplexer_are_left_out_and_counted(tmp_path, load, every):
     assert recording.strokes.exponent == pytest.approx(EXPONENT, rel=0.03)
 
 
-def test_a_healthy_recording_loses_no_sample(tmp_path):
+@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize("reading", [0.0, 0.7, np.nan])
+@pytest.mark.parametrize(("places", "samples"), [(60, 6), (5, 75)])
+def test_dropouts_of_either_end_are_left_out_and_named(tmp_path, end, reading, places, samples):
+    """They passed for a wrong gain, or for a delay of several periods."""
+    path, heading, time, forces = write(tmp_path / "r.csv")
+    starts = np.random.default_rng(places).integers(100, len(time) - 300, places)
+    dropped = np.unique(starts[:, None] + np.arange(samples))
+    forces[end, dropped] = reading
+    recording = read(save(path, heading, time, forces))
+    assert recording.account.counts["dropout"] >= len(dropped) and abs(recording.account.delay) < 0.05
+    assert recording.strokes.exponent == pytest.approx(EXPONENT, rel=0.03)
+    name = ("input_force", "output_force")[end]
+    assert any(f"samples of {name} are missing" in r and f"(sample {dropped[0] + 1})" in r for r in recording.account.remarks)
+
+
+@pytest.mark.parametrize("rate", [1, 5])
+def test_a_healthy_recording_loses_no_sample(tmp_path, rate):
+    """Nor does one that is slack, at 0 N, in each of its cycles, and is sampled slowly."""
     assert read(save(*write(tmp_path / "r.csv"))).account.counts["dropout"] == 0
+    path, heading, time, forces = write(tmp_path / "slack.csv")
+    slack = np.maximum(forces - 20.0, 0.0)[:, ::rate]
+    assert read(save(path, heading, time[::rate], slack)).account.counts["dropout"] == 0
 
 
 @pytest.mark.parametrize(("heading", "second", "words"), [("time_us", 1e6, "micros"), ("time_ms", 1e3, "millis")])
@@ -76,3 +97,13 @@ def test_two_recordings_in_one_file_are_still_named(tmp_path):
     time = np.where(TIME < 24, TIME, TIME - 24)
     with pytest.raises(DatasetError, match="two recordings in one file"):
         read(save(*write(tmp_path / "r.csv", time=time)))
+
+
+def test_swapped_ends_are_named_with_the_channels_to_exchange(tmp_path):
+    path, _, time, forces = write(tmp_path / "r.csv")
+    np.savetxt(path, np.column_stack([time, *forces[::-1]]), "%.7g", ",", header="time_s,Motor (N),Load (N)", comments="")
+    with pytest.raises(DatasetError, match="N above the input force") as refused:
+        bf.read(path, wrap_angle="180deg", channels=["input_force=Motor", "output_force=Load"])
+    assert "exchange them by --channel input_force=Load --channel output_force=Motor" in str(refused.value)
+    right = bf.read(path, wrap_angle="180deg", channels=["input_force=Load", "output_force=Motor"])
+    assert right.measurements.table(Recordings).items[0].strokes.exponent == pytest.approx(EXPONENT, rel=0.03)

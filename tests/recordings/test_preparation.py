@@ -335,7 +335,7 @@ def test_noise_does_not_shift_the_delay_by_more_than_the_error_in_common(noise, 
 def test_a_rest_at_the_start_has_no_weight_in_the_delay_until_the_rope_slides(ratio):
     x = np.concatenate([np.zeros(400), np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
     y, state = play(x, 0.2, start=0.05)
-    segments = Segments(0.005, x[None], y[None] + ratio, np.ones((1, 800)), np.full((1, 800), 1e-3))
+    segments = Segments(0.005, x[None], y[None] + ratio, np.ones((1, 800)), np.full((1, 800), 1e-3), 0.25)
     weight = _touched(segments, np.array([0.2, ratio, 0.0])).weight[0]
     assert np.array_equal(weight, np.arange(800) >= np.flatnonzero(state)[0])
 

@@ -28,7 +28,7 @@ from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 pytestmark = pytest.mark.extended
 
 NEWTONS_PER_POUND = 4.4482216152605
-SWAP = ["--channel input_force=OUTPUT_CHANNEL --channel output_force=INPUT_CHANNEL", "swapped"]
+SWAP = ["--channel input_force=output_force_N --channel output_force=input_force_N", "swapped"]
 TOML = """schema = 1
 name = "bench"
 

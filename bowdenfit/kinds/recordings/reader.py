@@ -276,7 +276,8 @@ def _only_stated_angle(description: Description, entry: RecordingFile) -> float 
 
 def _make_recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
     raw, entry = file.raw, file.entry
-    strokes = find_strokes(blocks, raw.file, raw.name, entry.strokes, cable_of(description))
+    cable = replace(cable_of(description), channels=raw.channels)
+    strokes = find_strokes(blocks, raw.file, raw.name, entry.strokes, cable)
     if entry.velocity is not None and not len(raw.velocity):
         speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
         blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))

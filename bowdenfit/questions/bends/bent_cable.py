@@ -18,7 +18,7 @@ from bowdenfit.physics.loop import (
     side_tensions,
     slack_load,
 )
-from bowdenfit.physics.stretch import mean_tension
+from bowdenfit.physics.stretch import extension_along, mean_tension, tension_from_extension
 
 Values = Mapping[str, Array]
 
@@ -114,10 +114,10 @@ class BentCable:
         """
         force = jnp.full_like(self.wrap_angle, input_force)
         at_rest, slack = self.preload(values, preload)
-        forward, back = (self._pulling_tension(values, force, at_rest, stroke) for stroke in (1.0, -1.0))
-        stretched = self.elastic.extension(values, forward) - self.elastic.extension(values, at_rest)
-        lost = self.elastic.extension(values, back) - self.elastic.extension(values, forward)
-        return stretched + slack, lost + slack
+        exponent = self.exponent(values) if self.model.cable.is_loop else self._stretch_exponent(values)
+        tensions = (self._pulling_tension(values, force, at_rest, stroke) for stroke in (1.0, -1.0))
+        forward, back = (self.elastic.extension_along(values, tension, exponent) for tension in tensions)
+        return forward - self.elastic.extension(values, at_rest) + slack, back - forward + slack
 
     def _pulling_tension(self, values: Values, force: Array, preload: Array, stroke: float) -> Array:
         """Mean tension of the side that pulls [N]."""
@@ -137,19 +137,20 @@ class BentCable:
     def stiffness(self, values: Values, load: float, preload: float | None = None) -> Float[Array, " bends"]:
         r"""Stiffness seen at the load side with the motor locked, while the load moves against friction [N/mm].
 
-        A loop's two sides act together, :math:`1/(a e'(\bar T_1)) + 1/(b e'(\bar T_2))`, until the returning one is slack.
+        A loop's two sides act together, :math:`1/(a e'(\bar T_1)) + 1/(b e'(\bar T_2))`, until the returning one is slack; e'
+        is averaged along the rope, whose ends bed in unlike each other.
         """
         force = jnp.full_like(self.wrap_angle, load)
         if not self.model.cable.is_loop:
             exponent = self._stretch_exponent(values)
             share = mean_tension(jnp.ones_like(exponent), exponent)
-            return 1 / (share * self.elastic.compliance(values, share * force))
+            return 1 / (share * self.elastic.compliance_along(values, share * force, exponent))
         exponent, at_rest = self.exponent(values), self.preload(values, preload)[0]
         unit = jnp.ones_like(exponent)
         a, b = mean_tension(unit, exponent), mean_tension(unit, -exponent)
         pulling, returning = side_tensions(force, at_rest, exponent, unit, self.rope(values))
-        second = jnp.where(returning > 0, 1 / (b * self.elastic.compliance(values, returning)), 0.0)
-        return 1 / (a * self.elastic.compliance(values, pulling)) + second
+        second = jnp.where(returning > 0, 1 / (b * self.elastic.compliance_along(values, returning, exponent)), 0.0)
+        return 1 / (a * self.elastic.compliance_along(values, pulling, exponent)) + second
 
     def lowest_preload(self, values: Values, input_force: float) -> Float[Array, ""]:
         """Lowest preload, at the reference angle, at which both sides stay taut at all these bends [N].
@@ -158,10 +159,9 @@ class BentCable:
             values: Values of the parameters.
             input_force: Force up to which a loop's return side must stay taut moving forward; 0 for the unloaded cable [N].
         """
-        exponent = self.exponent(values)
-        needed = (input_force / 2 if self.model.cable.is_loop else 0.0) * mean_tension(
-            jnp.ones_like(exponent), exponent
-        )
+        exponent, rope = self.exponent(values), self.rope(values)
+        alone = mean_tension(jnp.full_like(exponent, input_force if self.model.cable.is_loop else 0.0), exponent)
+        needed = alone / 2 if rope is None else tension_from_extension(extension_along(alone, exponent, rope) / 2, *rope)
         return jnp.max(self._reference_preload(values, needed))
 
     def highest_preload(self, values: Values, friction: float) -> Float[Array, ""]:

@@ -63,7 +63,7 @@ def _describe_delay(fit: Record) -> tuple[str, ...]:
     by_least_squares = fit.sampled is None
     off = fit.least_squares.estimates[delay.name].value if by_least_squares else fit.parameter(delay.name).median
     sds = abs(off) / delay.shown_scale / float(delay.prior.sd)
-    if sds < _MAX_DELAY_ERRORS:
+    if not sds >= _MAX_DELAY_ERRORS:  # nor where it is not determined
         return ()
     return (
         f"While the rope slides, the output seems {abs(off):.2g} ms {'later' if off > 0 else 'earlier'} than it was taken to "

@@ -25,6 +25,7 @@ from bowdenfit.recordings.preparation.blocks import (
 )
 from bowdenfit.recordings.preparation.checks import FEWEST_SAMPLES, check_recording, check_sign
 from bowdenfit.recordings.preparation.clock import (
+    DROPOUT,
     GOOD,
     KINDS,
     NO_OVERLAP,
@@ -37,7 +38,7 @@ from bowdenfit.recordings.preparation.clock import (
 from bowdenfit.recordings.preparation.delay import BEYOND, RANGE, Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import describe_noise, estimate_tare, noise_about_trend
-from bowdenfit.recordings.preparation.shift_scan import OVERLAP, LateOutput, ShiftScan, scan_shifts
+from bowdenfit.recordings.preparation.shift_scan import AS_WELL, OVERLAP, LateOutput, ShiftScan, scan_shifts
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Flags, Vector
 
@@ -45,6 +46,8 @@ _SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _MIRRORED = -0.9  # judged: correlation below which the output falls by all that the input rises
 _USUAL_BLOCK = 0.05
 _POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
+_MANY_DROPOUTS = 0.01  # share of the samples of a channel from which they are named; a judgement
+_SHARE_OF_PERIOD = 0.25  # judged: delay up to which an output is looked for, over the period; a later one may be an early one
 _ALL = 0.99  # share of a part of the output that lies within the input at every shift
 _LATE = (
     "{0}: the output is {1:.3g} s {2} than the input, which was found from the forces and taken off; the usual causes are a "
@@ -269,15 +272,23 @@ def _delay(raw: RawRecording, cleaned: _Cleaned, common: CommonClock, settings: 
     if raw.loop:
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
     estimate = _estimate_delay(common, settings, slice(None))
-    if late := _find_late_output(raw, common, is_beyond=estimate.reason == BEYOND):
+    is_beyond = estimate.reason.startswith(BEYOND)
+    if late := _find_late_output(raw, cleaned, common, is_beyond=is_beyond):
         remainder = _estimate_delay(_together(raw, cleaned, settings, late.delay), settings, slice(None))
-        delay = late.delay + remainder.value
-        remark = _LATE.format(raw.name, abs(delay), "later" if delay > 0 else "earlier")
-        return Delay(delay, remainder.sd if remainder.sd > 0 else late.sd, remainder.exponent, remark)
-    return estimate
+        sd = remainder.sd if remainder.sd > 0 else late.sd
+        estimate = Delay(late.delay + remainder.value, sd, remainder.exponent)
+    elif is_beyond and (main := _main_frequency(common)) > 0:
+        further = _estimate_delay(common, settings, slice(None), max(_SHARE_OF_PERIOD / main, RANGE))
+        estimate = further if further.sd > 0 else estimate
+    if abs(estimate.value) <= RANGE:
+        return estimate
+    side = "later" if estimate.value > 0 else "earlier"
+    return replace(estimate, remark=_LATE.format(raw.name, abs(estimate.value), side))
 
 
-def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool) -> LateOutput | None:
+def _find_late_output(
+    raw: RawRecording, cleaned: _Cleaned, common: CommonClock, *, is_beyond: bool
+) -> LateOutput | None:
     """Return by how much the output is late, if that is more than `estimate_delay` looks for.
 
     Raises:
@@ -287,12 +298,17 @@ def _find_late_output(raw: RawRecording, common: CommonClock, *, is_beyond: bool
     is_short = np.ptp(common.time) < 2 * RANGE  # no room for a delay beyond the range
     if is_short or np.count_nonzero(good) < FEWEST_SAMPLES or _is_opposed(common, good):
         return None
-    late = _scan(common, good, slice(None), OVERLAP).late_output(is_beyond=is_beyond)
+    ends = [read_at(channel, common.time)[1] == GOOD for channel in (cleaned.input, cleaned.output)]
+    scan = _scan(common, ends, slice(None), OVERLAP)
+    late = scan.late_output(is_beyond=is_beyond)
     if late is None:
         return None
-    ends = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
-    lasting = slice(*np.searchsorted(common.time, ends).tolist())  # what has a partner with the delay and without
-    if _scan(common, good, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
+    swapped = replace(common, input_force=common.output_force, output_force=common.input_force)
+    if AS_WELL * _scan(swapped, ends[::-1], slice(None), OVERLAP).usual < scan.best[1]:
+        return None  # the ends are exchanged, which is refused later
+    limits = common.time[0] + max(late.delay, 0.0), common.time[-1] + min(late.delay, 0.0)
+    lasting = slice(*np.searchsorted(common.time, limits).tolist())  # what has a partner with the delay and without
+    if _scan(common, ends, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
         return None  # something else than the delay differs between the parts of the recording
     if late.rival is not None:
         raise DatasetError(
@@ -312,10 +328,10 @@ def _is_opposed(common: CommonClock, good: Flags) -> bool:
     return all(np.ptp(force) > 0 for force in forces) and float(np.corrcoef(*forces)[0, 1]) < _MIRRORED
 
 
-def _scan(common: CommonClock, good: Flags, part: slice, overlap: float) -> ShiftScan:
-    """Compare the input with a part of the output, at every shift."""
-    time, force = common.time, common.output_force
-    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, (good, good[part]), overlap)
+def _scan(common: CommonClock, good: Sequence[Flags], part: slice, overlap: float) -> ShiftScan:
+    """Compare the good samples of the input with those of a part of the output, at every shift."""
+    time, force, both = common.time, common.output_force, (good[0], good[1][part])
+    return scan_shifts(time, common.input_force, time[part], force[part], _POINTS_OF_SCAN, both, overlap)
 
 
 def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay]]:
@@ -328,10 +344,10 @@ def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay
     return [(float(common.time[part].mean()), _estimate_delay(common, inspected.settings, part)) for part in parts]
 
 
-def _estimate_delay(common: CommonClock, settings: Preparation, part: slice) -> Delay:
+def _estimate_delay(common: CommonClock, settings: Preparation, part: slice, reach: float = RANGE) -> Delay:
     shortest = _USUAL_BLOCK if settings.block == "auto" else _stated_block(settings)
     good = common.fault[part] == GOOD
-    return estimate_delay(common.time[part], common.input_force[part], common.output_force[part], good, shortest)
+    return estimate_delay(common.time[part], common.input_force[part], common.output_force[part], good, shortest, reach)
 
 
 def _stated_block(settings: Preparation) -> float:
@@ -392,6 +408,14 @@ def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[st
             before = np.flatnonzero(channel.gap)
             length = float((channel.time[before + 1] - channel.time[before]).sum())
             remarks.append(f"The clock of {name} has {int(channel.gap.sum())} gaps, {length:.3g} s together.")
+        missing = channel.fault == DROPOUT
+        if np.count_nonzero(missing) > _MANY_DROPOUTS * len(missing):
+            first = np.flatnonzero(np.diff(missing, prepend=False) & missing)
+            remarks.append(
+                f"{np.count_nonzero(missing)} samples of {name} are missing, frozen, or jump to one reading and back; they "
+                f"were left out. They are in {len(first)} places, the first at {channel.time[first[0]]:.2f} s (sample "
+                f"{first[0] + 1}). The usual causes are a loose plug and a logger that skips samples."
+            )
     if counts["saturated"]:
         remarks.append(
             f"{counts['saturated']} samples rest at the lowest or the highest reading of a load cell, as of one that is "

@@ -34,8 +34,8 @@ from bowdenfit.recordings.preparation.segments import (
 )
 from bowdenfit.types import ChosenVector, Flags, Labels, Matrix, OtherVector, Vector
 
-RANGE = 0.25  # [s]; judged: filters and buses delay by less, and more would reach over whole strokes
-BEYOND = f"the best fit lies at the end of the range of {RANGE} s that was searched"
+RANGE = 0.25  # [s]; judged: filters and buses delay by less
+BEYOND = "the best fit lies at the end of the range that was searched"
 UNKNOWN = "How much later the output channel is than the input channel cannot be known from this recording"
 COMMON_ERROR = 0.0015  # [s]; what is left over the 24 simulated benches (scripts/check_recordings.py simulates others)
 _FRICTIONS = np.linspace(0.3, 1.2, 10)  # of half the width of the loop, which delay and noise make wider: the start of a search
@@ -67,7 +67,9 @@ class Delay:
     reason: str = ""
 
 
-def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good: Flags, shortest: float) -> Delay:
+def estimate_delay(
+    time: Vector, input_force: Vector, output_force: Vector, good: Flags, shortest: float, reach: float = RANGE
+) -> Delay:
     """Least squares of the play operator over friction exponent, ratio of the sensors, and delay.
 
     Args:
@@ -76,6 +78,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
         output_force: Output force, not yet shifted [N].
         good: Samples that may be used.
         shortest: Length of a block [s]; a standard error of more than two of them is of no use.
+        reach: Longest delay that is looked for [s].
 
     The standard error is that of the curvature, with the autocorrelation of the residuals, what noise shifts, how far a
     delay with much drag is from one with little, and COMMON_ERROR for what smoothing shifts in every recording alike.
@@ -83,7 +86,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
     Returns:
         The delay with its standard error, or 0 with a remark where the recording does not tell.
     """
-    segments = cut_segments(time, input_force, output_force, good)
+    segments = cut_segments(time, input_force, output_force, good, reach)
     if segments is None or not len(_usable(segments)):
         return _undetermined("it has too few good readings above zero force")
     if not reverses(segments):
@@ -99,8 +102,8 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
         return _undetermined("the output does not follow the input both ways")
     if not np.isfinite(sd) or sd > min(RANGE / 2, 2 * max(shortest, segments.step)):
         return _undetermined(f"its standard error would be {sd:.2g} s")
-    if abs(point[2]) > RANGE - segments.step:
-        return _undetermined(BEYOND)
+    if abs(point[2]) > reach - segments.step:
+        return _undetermined(f"{BEYOND}, {reach:.2g} s")
     return Delay(float(point[2]), sd, float(point[0]))
 
 
@@ -152,7 +155,7 @@ def _by_noise(segments: Segments, residuals: ChosenVector) -> float:
 
 def _inner(segments: Segments) -> Matrix:
     """Return weights without the ends of the segments, where shifted points would be missing."""
-    edge = min(round(RANGE / segments.step) + 1, segments.x.shape[1] // 4)
+    edge = min(round(segments.reach / segments.step) + 1, segments.x.shape[1] // 4)
     weight = segments.weight.copy()
     weight[:, :edge] = 0
     weight[:, weight.shape[1] - edge :] = 0
@@ -174,7 +177,7 @@ def _coarse(every: Segments) -> Vector:
     exponents = half * _FRICTIONS
     outputs = play_along_rows(segments.x, starts(segments, -center), exponents)
     stride = max(1, round(0.01 / segments.step))
-    reach = round(RANGE / segments.step) // stride * stride
+    reach = round(segments.reach / segments.step) // stride * stride
     best, best_point = np.inf, np.zeros(3)
     for shift in range(-reach, reach + 1, stride):
         rests = segments.y - outputs[:, :, np.clip(np.arange(weight.shape[1]) - shift, 0, weight.shape[1] - 1)]
@@ -203,7 +206,7 @@ def _refined(segments: Segments, rests: Rests | None, start: Vector) -> tuple[Ve
         step = damping * np.linalg.lstsq(slopes, residuals, rcond=None)[0]
         tried = np.array(
             [max(point[0] + step[0], 1e-6), np.clip(point[1] + step[1], -_MOST_RATIO, _MOST_RATIO)]
-            + [np.clip(point[2] + step[2], -RANGE, RANGE)]
+            + [np.clip(point[2] + step[2], -segments.reach, segments.reach)]
             + [np.clip(point[3] + change, 0.0, np.exp(np.max(segments.y))) for change in step[3:]]
         )
         new_residuals, new_slopes = _linearized(segments, rests, weight, tried, initial_drag)

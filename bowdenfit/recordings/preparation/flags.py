@@ -14,6 +14,7 @@ from bowdenfit.types import ChosenFlags, ChosenVector, Flags, Labels, OtherVecto
 
 _SPIKE_SDS = 8.0  # judged: one normal sample in 10^15 is so far off
 _HALF_WINDOW = 5  # judged: samples on each side of the running median
+_SUDDEN = 3.0  # judged: of the steps that 99 % of samples stay below, beyond which a force does not fall in one
 _LOADED = 0.2  # judged: of the typical force, above which a force does not fall to 0 and back from sample to sample
 _LONGEST_SPIKE = 3  # samples; judged: what is longer may be motion
 _SHORTEST_RUN = 10  # judged: equal samples from which a run may be a frozen channel
@@ -103,17 +104,25 @@ def flag_samples(
 
 
 def _skipped(force: Vector) -> Flags:
-    """Return up to three successive samples that are exactly 0 between samples far above it, as a multiplexer writes them."""
-    zero = force == 0
-    if not zero.any():
-        return zero
+    """Return samples that are exactly 0 between samples far above it, as a multiplexer or a loose plug writes them.
+
+    The lowest reading stands for 0 where that is not 0 but repeated: a channel may have been tared. Zeros that last for more
+    than a few samples are those of a slack rope unless the force falls to them faster than it moves.
+    """
     some = subsample(force)
+    lowest = float(np.nanmin(some)) if np.any(np.isfinite(some)) else 0.0
+    zero = (force == 0) | (force == lowest)
+    if np.count_nonzero(zero) < 2:
+        return np.zeros(len(force), dtype=bool)
     loaded = force > _LOADED * float(np.nanmedian(some[some > 0])) if np.any(some > 0) else zero
     edges = np.diff(zero.astype(np.int8), prepend=0, append=0)
     start, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    inside = (start > 0) & (end < len(force)) & (end - start <= _LONGEST_SPIKE)
+    inside = (start > 0) & (end < len(force))
     start, end = start[inside], end[inside]
+    steps = np.abs(np.diff(some[(some != 0) & (some != lowest)]))
+    fall = _SUDDEN * float(np.nanquantile(steps, 0.99)) if len(steps) else 0.0
     sudden = loaded[start - 1] & loaded[end]
+    sudden &= (end - start <= _LONGEST_SPIKE) | (np.minimum(force[start - 1], force[end]) > fall)
     return _from_to(start[sudden], end[sudden], len(force))
 
 

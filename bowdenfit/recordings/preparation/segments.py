@@ -41,6 +41,7 @@ class Segments:
         y: log output force, smoothed alike [1].
         weight: Inverse relative variance of each point, 0 where it must not be used.
         jitter: Standard deviation of x by noise [1].
+        reach: Longest delay that is looked for [s].
         width: Width of the Gaussian that both are smoothed with [s].
     """
 
@@ -49,6 +50,7 @@ class Segments:
     y: Matrix
     weight: Matrix
     jitter: Matrix
+    reach: float
     width: float = _WIDTH
 
 
@@ -68,8 +70,15 @@ class Rests:
     heading: Matrix
 
 
-def cut_segments(time: Vector, input_force: Vector, output_force: Vector, good: Flags) -> Segments | None:
-    """Average onto a coarse clock and cut into stretches of equal length, the liveliest of which are kept."""
+def cut_segments(time: Vector, input_force: Vector, output_force: Vector, good: Flags, reach: float) -> Segments | None:
+    """Average onto a coarse clock and cut into stretches of equal length, the liveliest of which are kept.
+
+    Args:
+        time: Common clock [s].
+        input_force, output_force: Forces [N].
+        good: Samples that may be used.
+        reach: Longest delay that is looked for [s].
+    """
     span = float(time[-1] - time[0])
     rate = (len(time) - 1) / span
     step = max(round(_STEP * rate), 1) / rate
@@ -92,7 +101,7 @@ def cut_segments(time: Vector, input_force: Vector, output_force: Vector, good: 
     x, y, weight, jitter, pulled = (v[: rows * length].reshape(rows, length) for v in columns)
     chosen = _most_varied(x, max(1, _MOST_POINTS // length))
     moved = np.stack([_smooth(np.log(smooth_input(force)), step, width) for force in pulled[chosen]])
-    return Segments(step, moved, y[chosen], weight[chosen], jitter[chosen], width)
+    return Segments(step, moved, y[chosen], weight[chosen], jitter[chosen], reach, width)
 
 
 def _sums(

@@ -21,6 +21,7 @@ _EXPONENTS = np.linspace(0.0, 0.45, 12)  # over the range of log input force; at
 _FINER = np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75])  # of the distance between them
 _STARTS = np.array([-1.0, 0.0, 1.0])  # where in its band the rope may be at the start, in friction exponents
 _LEAST_FORCE = 1e-3  # of the largest, below which a rope is slack
+_HOLE = 0.05  # judged: of a period, from which a hole may hide a turn
 _WILD = 1e-3  # share of the forces at each end that may be spikes
 _MOVES = 0.3  # judged: of the output's variance, which the part in common must have at least
 OVERLAP = 0.5  # judged: share of the shorter recording that must lie within the other
@@ -77,6 +78,11 @@ class ShiftScan:
         best = int(np.argmin(self.unexplained))
         return float(self.shift[best]), float(self.unexplained[best])
 
+    @property
+    def usual(self) -> float:
+        """What the best shift within the range of `delay` leaves unexplained."""
+        return float(np.min(self.unexplained, where=np.abs(self.shift) <= RANGE, initial=1.0))
+
     def rival(self) -> float | None:
         """Return another shift that fits about as well as the best, with worse ones between them; None if there is none."""
         as_well = self.unexplained < AS_WELL * self.best[1]
@@ -98,7 +104,7 @@ class ShiftScan:
             is_beyond: Whether the delay is known to lie beyond the range, or at its end.
         """
         least = self.best[1]
-        usual = np.min(self.unexplained, where=np.abs(self.shift) <= RANGE, initial=1.0)
+        usual = self.usual
         if least > _FOLLOWED or usual < max((_BETTER if is_beyond else _MUCH_BETTER) * least, _NEGLIGIBLE):
             return None
         as_well = np.flatnonzero(self.unexplained <= np.sqrt(least * usual))
@@ -134,7 +140,8 @@ def scan_shifts(
     x, is_x = _average(input_time, input_force, good[0] if good else None, step)
     y, is_y = _average(output_time, output_force, good[1] if good else None, step)
     log_input = np.log(np.maximum(x, _LEAST_FORCE * np.max(x)))
-    explained = np.zeros(len(x) + len(y) - 1)
+    explained, main = np.zeros(len(x) + len(y) - 1), main_frequency(x, x, 1 / step)
+    is_x = _drop_after_holes(is_x, 1 / (main * step)) if main > 0 else is_x
     reference = _Reference.of(is_x, y, is_y)
     rows = np.repeat(log_input[None], len(_STARTS), axis=0)
     exponents, apart = _EXPONENTS * np.ptp(log_input), np.ptp(log_input) * _EXPONENTS[1]
@@ -149,9 +156,25 @@ def scan_shifts(
     lags = np.arange(len(explained)) - (len(x) - 1)
     common = np.minimum(len(x), len(y) - lags) - np.maximum(0, -lags)
     unexplained = np.where(common >= overlap * min(len(x), len(y)), 1 - explained, 1.0)
-    main = main_frequency(x, x, 1 / step)
     near = max(RANGE, 0.25 / main) if main > 0 else RANGE
     return ShiftScan(input_time[0] - output_time[0] - lags * step, unexplained, near)
+
+
+def _drop_after_holes(is_x: np.ndarray, period: float) -> np.ndarray:
+    """Return weights of the input without the period after each hole in which a turn may be missing.
+
+    Only after a pull and a return does the operator follow the input again, whatever it was led through in the hole.
+
+    Args:
+        is_x: 1 where the input is known.
+        period: Points of a cycle.
+    """
+    edges = np.diff(is_x, prepend=1.0, append=1.0)
+    begins, ends = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
+    kept = is_x.copy()
+    for end in ends[ends - begins > _HOLE * period]:
+        kept[end : end + int(np.ceil(period))] = 0.0
+    return kept
 
 
 def _average(time: OtherVector, force: OtherVector, good: ChosenFlags | None, step: float) -> tuple[Vector, Vector]:

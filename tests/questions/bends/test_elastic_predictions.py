@@ -55,6 +55,11 @@ def tension(extended: float, rope: tuple[float, float, float]) -> float:
     return float(brentq(lambda t: extension(t, *rope) - extended, 0.0, 1e6, xtol=1e-12, rtol=1e-14))
 
 
+def extension_under(force: float, exponent: float, rope: tuple[float, float, float]) -> float:
+    """Extension of a rope along which friction lets the tension fall from a force at its end [mm]."""
+    return quad(lambda x: extension(force * np.exp(-exponent * x), *rope), 0.0, 1.0, epsabs=1e-13, epsrel=1e-12)[0]
+
+
 def share(exponent: float) -> float:
     """Mean tension over the tension at the end that the rope slides toward."""
     return quad(lambda x: np.exp(-exponent * x), 0.0, 1.0, epsabs=1e-14, epsrel=1e-13)[0]
@@ -80,10 +85,10 @@ def test_without_preload_and_lengthening_every_prediction_is_that_of_the_capstan
     np.testing.assert_array_equal(elastic.friction(BENDS)[0], 0.0)
     for answer in elastic.preload(BENDS):
         np.testing.assert_array_equal(answer[0], 0.0)
-    forward, back = (np.array([share(s * MU * bend) for bend in BENDS]) for s in (1, -1))
+    forward, back = (np.array([extension_under(40.0, s * MU * bend, ROPE) for bend in BENDS]) for s in (1, -1))
     error, lost = elastic.position(BENDS, 40.0)
-    np.testing.assert_allclose(error[0], extension(40 * forward, *ROPE), rtol=1e-12)
-    np.testing.assert_allclose(lost[0], extension(40 * back, *ROPE) - extension(40 * forward, *ROPE), atol=1e-13)
+    np.testing.assert_allclose(error[0], forward, rtol=1e-8)
+    np.testing.assert_allclose(lost[0], back - forward, rtol=1e-7, atol=1e-13)
     window = elastic.preload_window((0.0, np.pi), friction=1.0)
     assert (window.lowest.median, window.best, window.felt.median, window.possible) == (0.0, 0.0, 0.0, 1.0)
 
@@ -142,9 +147,8 @@ def preloads(bends: np.ndarray, lengthening: float = TRUTH["lengthening"] / DEGR
 
 
 def returning(preload: np.ndarray, bends: np.ndarray, force: float) -> np.ndarray:
-    """Mean tension of the returning side of a linear loop [N], which friction lets fall to 0."""
-    a, b = (np.array([share(s * MU * bend) for bend in bends]) for s in (1, -1))
-    return 2 * preload - a * (2 * preload + b * force) / (a + b)
+    """How far the returning side stays extended where the pulling one passes all of the force [mm]; below 0 it is slack."""
+    return 2 * extension(preload, *ROPE) - np.array([extension_under(force, MU * bend, ROPE) for bend in bends])
 
 
 @pytest.mark.extended
@@ -199,9 +203,9 @@ def test_the_best_preload_keeps_the_cable_taut_in_95_of_100_draws(force, limit):
     for draws in zip(*(np.asarray(value) for value in values.values()), strict=True):
         v = dict(zip(values, map(float, draws), strict=True))
         rope = (v["stiffness"], v["bedding_stretch"], v["bedding_load"])
-        needed = np.array([force / 2 * share(v["mu"] * bend) for bend in bends])
+        alone = np.array([extension_under(force, v["mu"] * bend, rope) for bend in bends])
         shift = v["lengthening"] * (bends - REFERENCE)
-        lowest.append(max(tension(x, rope) for x in extension(needed, *rope) - shift))
+        lowest.append(max(tension(x, rope) for x in alone / 2 - shift))
         there = [tension(x, rope) for x in extension(window.best, *rope) + shift]
         felt.append(np.max(2 * v["mu"] * bends * there))
     assert np.mean(np.array(lowest) <= window.best) == pytest.approx(0.95, abs=1 / 400)
@@ -223,11 +227,16 @@ def displacement(force: float, exponent: float, preload: float | None, rope: tup
     tension that friction leaves along it.
     """
     if preload is None:
-        return float(extension(force * share(exponent), *rope))
+        return float(extension_under(force, exponent, rope))
     at_rest = extension(preload, *rope)
 
+    def end_force(extended: float, exponent: float) -> float:
+        if extended <= 0:
+            return 0.0
+        return float(brentq(lambda f: extension_under(f, exponent, rope) - extended, 0.0, 1e5, xtol=1e-11, rtol=1e-13))
+
     def resisting(moved: float) -> float:
-        return tension(at_rest + moved, rope) / share(exponent) - tension(at_rest - moved, rope) / share(-exponent)
+        return end_force(at_rest + moved, exponent) - end_force(at_rest - moved, -exponent)
 
     return float(brentq(lambda moved: resisting(moved) - force, -at_rest, 1e3, xtol=1e-13))
 
@@ -291,9 +300,9 @@ def test_the_position_error_of_a_preloaded_rope_counts_from_its_preload_and_its_
     for i, bend in enumerate(BENDS):
         at_rest = extension(8.0, *ROPE) + TRUTH["lengthening"] / DEGREE * (bend - REFERENCE)
         pulled = max(25.0, tension(at_rest, ROPE))
-        forward, back = (extension(pulled * share(s * MU * bend), *ROPE) for s in (1, -1))
-        assert error[0][i] == pytest.approx(forward - at_rest, rel=1e-9, abs=1e-12)
-        assert lost[0][i] == pytest.approx(back - forward + max(-at_rest, 0.0), rel=1e-9, abs=1e-12)
+        forward, back = (extension_under(pulled, s * MU * bend, ROPE) for s in (1, -1))
+        assert error[0][i] == pytest.approx(forward - at_rest, rel=1e-8, abs=1e-12)
+        assert lost[0][i] == pytest.approx(back - forward + max(-at_rest, 0.0), rel=1e-7, abs=1e-12)
 
 
 def test_a_rope_of_which_only_the_preload_was_read_still_has_its_answers():

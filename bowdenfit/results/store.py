@@ -20,6 +20,7 @@ from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.outputs import write_text
 from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, record_figure_data, write_answers
+from bowdenfit.results.data_changes import locate_data_set
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page
 from bowdenfit.results.netcdf import (
     DERIVED,
@@ -72,10 +73,11 @@ def save(
         else:
             write_groups(folder / POSTERIOR, *posterior_page(fit))
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
-        page = _fit_text(_fit_page(fit) | {"posterior_crc32": file_checksum(folder / POSTERIOR)}, fit.dataset.measurements)
+        page = _fit_page(fit) | locate_data_set(fit.dataset.folder, folder)
+        text = _fit_text(page | {"posterior_crc32": file_checksum(folder / POSTERIOR)}, fit.dataset.measurements)
         (folder / FIGURE_DATA).unlink(missing_ok=True)
-        write_answers(folder, answers, page)
-        write_text(folder / FIT, page)
+        write_answers(folder, answers, text)
+        write_text(folder / FIT, text)
 
 
 def save_figure_data(figures: Mapping[str, Any], folder: Path) -> None:

@@ -170,9 +170,9 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         printed = await workbench.compute(_read_summary, folder)
         contents = block("div", id="contents")
         past = await workbench.compute(read_past_fit, workbench, name)
-        if past.change:
+        if change := past.changes.describe():
             with block("div", "verdict doubtful", role="status"):
-                text(past.change)
+                text(change)
         with block("div", "columns-of-page"):
             with block("div") as left, section("The answer", "answer"):
                 answer = _show_text(printed)

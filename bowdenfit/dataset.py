@@ -4,7 +4,7 @@ import glob
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -241,11 +241,17 @@ def read_dataset(
         with faults.collect():
             read = kind.read(Source(kind.name, settings, description, folder, channels or {}))
             remarks = (*(remark for account in read.accounts for remark in account.remarks), *read.remarks)
-            measurements = Measurements((*measurements.tables, read.table), (*measurements.remarks, *remarks))
+            excluded = tuple(reading for account in read.accounts for reading in account.excluded)
+            measurements = replace(
+                measurements,
+                tables=(*measurements.tables, read.table),
+                remarks=(*measurements.remarks, *remarks),
+                excluded=measurements.excluded | ({kind.name: excluded} if excluded else {}),
+            )
             accounts += read.accounts
             checksums |= {name: sha256_of(path) for name, path in read.files.items()}
-    if excluded := description.tables.describe_excluded():
-        measurements = Measurements(measurements.tables, (excluded, *measurements.remarks))
+    if sentence := description.tables.describe_excluded():
+        measurements = replace(measurements, remarks=(sentence, *measurements.remarks))
     faults.refuse()
     if channels and not any(kind.takes_channels for kind, _ in iterate_tables(measurements)):
         raise DescriptionError(

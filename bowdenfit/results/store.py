@@ -12,6 +12,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import BowdenfitError, StoreError
+from bowdenfit.files.row_account import ExcludedReading
 from bowdenfit.inference.diagnostics import as_chains
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 SCHEMA = 7  # counted up with every change of what files mean
 LOG_POSTERIOR, WALKER = "lp", "walker"
+EXCLUDED = "excluded"  # readings that the user leaves out, next to the tables
 _SAMPLERS = "emcee", "nuts", "importance"
 _WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
@@ -215,7 +217,8 @@ def _fit_text(page: Mapping[str, Any], measurements: Measurements) -> str:
 
 def _measurements_page(measurements: Measurements) -> dict[str, Any]:
     tables = {kind.name: table for kind, table in iterate_tables(measurements)}
-    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, "remarks": measurements.remarks})
+    others = {"remarks": measurements.remarks, EXCLUDED: measurements.excluded}
+    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, **others})
     return page
 
 
@@ -226,7 +229,8 @@ def _posterior_page(posterior: Draws) -> dict[str, Any]:
 
 def _measurements(page: Mapping[str, Any]) -> Measurements:
     tables = (deserialize(kind.table | None, page.get(name)) for name, kind in KINDS.items())
-    return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]))
+    excluded = deserialize(dict[str, tuple[ExcludedReading, ...]], page.get(EXCLUDED, {}))  # no fit had it once
+    return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]), excluded)
 
 
 def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:

@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 from nicegui import ui
 
+from bowdenfit.addons.app.curve_menu import is_of_curves, show_curve_menu
 from bowdenfit.addons.app.data_charts import sketch_file
 from bowdenfit.addons.app.draft import Draft, Refusal, Understanding
 from bowdenfit.addons.app.elements import (
@@ -110,7 +111,7 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     with section("What was read", "read"):
         _show_refusals(understanding.refusals)
         _show_files(draft, understanding, look_again)
-    _show_questions(draft, understanding, look_again)
+    _show_questions(workbench, draft, understanding, look_again)
     if not understanding.description:
         return
     with section("What it means", "understood"):
@@ -246,7 +247,7 @@ def _show_refused_rows(file: str, refusals: list[Refusal]) -> None:
                         text(page_words(refusal.sentence), "p", "fault")
 
 
-def _show_questions(draft: Draft, understanding: Understanding, look_again: Again) -> None:
+def _show_questions(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
     """Show what the files do not say."""
     if not understanding.entries:
         return
@@ -263,7 +264,9 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
             key = f"question-{number}"
             hint = "" if entry.key in draft.answers and not entry.fault else entry.hint
             with field(entry.words, key, hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
-                if entry.options:
+                if is_of_curves([option for option, _ in entry.options]):
+                    show_curve_menu(workbench, key, entry.answer, entry.options, partial(answer, entry.key), entry.words)
+                elif entry.options:
                     options = entry.options if entry.answer else (("", "choose one"), *entry.options)
                     choice(key, entry.answer, options, partial(answer, entry.key))
                 else:

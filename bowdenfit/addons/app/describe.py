@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
+from bowdenfit.addons.app.curve_menu import is_of_curves, show_curve_menu
 from bowdenfit.addons.app.description_edit import read_description_text, write_description
 from bowdenfit.addons.app.description_form import (
     MENU,
@@ -103,7 +104,10 @@ class DescribePage:
             if options:
                 unknown = () if entry.value in ("", *options) else (entry.value,)
                 choices = [("", "left out"), *((option, option) for option in (*options, *unknown))]
-                choice(entry.key, entry.value, choices, self._setter(entry))
+                if is_of_curves(options):
+                    show_curve_menu(self._workbench, entry.key, entry.value, choices, self._setter(entry), label)
+                else:
+                    choice(entry.key, entry.value, choices, self._setter(entry))
             else:
                 text_input(entry.key, entry.value, self._setter(entry))
 

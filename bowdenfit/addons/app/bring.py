@@ -25,7 +25,7 @@ from bowdenfit.addons.app.elements import (
 )
 from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import attempt, frame, notify, refused, section
-from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
+from bowdenfit.addons.app.measured_view import MeasuredView, show_checked, sort_warnings
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.sheet import FILE as TYPED
 from bowdenfit.addons.app.sheet import TypedSheet
@@ -124,7 +124,8 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     if understanding.checked is not None:
         _show_writing(workbench, draft)
     with place:
-        await MeasuredView(workbench, draft.folder).show(understanding.refusals)
+        warnings = sort_warnings(understanding.checked) if understanding.checked is not None else {}
+        await MeasuredView(workbench, draft.folder).show(understanding.refusals, warnings)
 
 
 def _show_steps(understanding: Understanding) -> None:

@@ -264,9 +264,11 @@ def _show_questions(workbench: Workbench, draft: Draft, understanding: Understan
         for number, entry in enumerate(understanding.entries):
             key = f"question-{number}"
             hint = "" if entry.key in draft.answers and not entry.fault else entry.hint
-            with field(entry.words, key, hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
-                if is_of_curves([option for option, _ in entry.options]):
-                    show_curve_menu(workbench, key, entry.answer, entry.options, partial(answer, entry.key), entry.words)
+            has_pictures = is_of_curves([option for option, _ in entry.options])
+            words = f"{entry.words.partition(':')[0]}?" if has_pictures else entry.words  # the menu says what each option is
+            with field(words, key, hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
+                if has_pictures:
+                    show_curve_menu(workbench, key, entry.answer, entry.options, partial(answer, entry.key), words)
                 elif entry.options:
                     options = entry.options if entry.answer else (("", "choose one"), *entry.options)
                     choice(key, entry.answer, options, partial(answer, entry.key))

@@ -14,7 +14,7 @@ from bowdenfit.kinds.tables import PreloadTable, StretchTable
 from bowdenfit.pages.section import Chart
 
 _MOST_CHARTS = 24  # runs on a page, as of recordings
-_NOT_READINGS = tuple((stroke, "Not of what is at the far end", "gray", "hollow") for stroke in (1, -1, 0))
+_NOT_READINGS = tuple((stroke, "Not used", "gray", "hollow") for stroke in (1, -1, 0))
 
 
 def _draw_stretch(table: StretchTable, dataset: Dataset, unused: Sequence[UnusedRow]) -> list[Chart]:

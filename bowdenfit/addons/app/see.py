@@ -264,7 +264,7 @@ def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str)
 
 def _show_text(printed: Reply) -> Any:
     """Show a summary as it was written, and return where it is."""
-    words = Preformatted(page_words(printed.text)).to_html()
+    words = Preformatted(page_words(printed.text)).to_html().replace("<pre>", '<pre tabindex="0">')  # which scrolls
     return markup(words, "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
 
 

@@ -206,13 +206,18 @@ def numbers_with_units_by_name(example: str, named: str) -> Reader:
     return Reader(read_all, list[str])
 
 
-def numbers_by_name(example: str) -> Reader:
-    """Return what reads numbers by names, which the command line writes as the example."""
+def numbers_by_name(example: str, called: str = "kind") -> Reader:
+    """Return what reads numbers by names, which the command line writes as the example.
+
+    Args:
+        example: One of them.
+        called: What the names are of.
+    """
 
     def read(text: str, name: str) -> tuple[str, float]:
         key, _, number = text.partition("=")
         if not _FLOAT.fullmatch(number.strip()):
-            raise UsageError(f"{name} {shown(text)} is not a kind and a number; write it as {example}.")
+            raise UsageError(f"{name} {shown(text)} is not a {called} and a number; write it as {example}.")
         return key.strip(), float(number)
 
     return Reader(

@@ -1,11 +1,10 @@
 """A data set: the description and the tables of one folder, read together and checked against each other."""
 
 import glob
-import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from bowdenfit.files import is_ros2_folder
 from bowdenfit.files.headings import parse_sources
 from bowdenfit.files.isolation import limits_times
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.inputs import refuse_special
+from bowdenfit.inputs import refuse_special, sha256_of
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.descriptions import (
     add_columns,
@@ -49,12 +48,14 @@ class Dataset(Display):
         measurements: Tables of readings.
         sha256: Checksum of every file that was read, by file name.
         accounts: Where the rows of each of its tables and recordings went; empty where it was not read from files.
+        folder: Folder that its files are named from; None where it was not read from files.
     """
 
     description: Description
     measurements: Measurements
     sha256: dict[str, str]
     accounts: tuple[RowAccount, ...] = ()
+    folder: Path | None = None
 
     def sentences(self) -> list[str]:
         """Return what the cable is, and what was measured on it."""
@@ -138,7 +139,7 @@ def load_dataset(
     is_file = path.suffix.lower() == ".toml" and not path.is_dir()
     file, faults = path if is_file else path / DESCRIPTION_FILE, Faults()
     description = load_description(file, overrides, columns, faults, missing)
-    return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels, faults)
+    return read_dataset(description, file.parent, {file.name: sha256_of(file)}, channels, faults)
 
 
 def is_lone_file(path: Path) -> bool:
@@ -233,7 +234,7 @@ def read_dataset(
     if description.has_routes:
         description, routes, remarks = route_angles.measure_routes(description, folder)
         measurements = Measurements((), remarks)
-        checksums |= {name: _sha256(path) for name, path in routes.items()}
+        checksums |= {name: sha256_of(path) for name, path in routes.items()}
     for kind in KINDS.values():
         settings = description.tables.stated.get(kind.name)
         if settings is None:
@@ -241,11 +242,17 @@ def read_dataset(
         with faults.collect():
             read = kind.read(Source(kind.name, settings, description, folder, channels or {}))
             remarks = (*(remark for account in read.accounts for remark in account.remarks), *read.remarks)
-            measurements = Measurements((*measurements.tables, read.table), (*measurements.remarks, *remarks))
+            excluded = tuple(reading for account in read.accounts for reading in account.excluded)
+            measurements = replace(
+                measurements,
+                tables=(*measurements.tables, read.table),
+                remarks=(*measurements.remarks, *remarks),
+                excluded=measurements.excluded | ({kind.name: excluded} if excluded else {}),
+            )
             accounts += read.accounts
-            checksums |= {name: _sha256(path) for name, path in read.files.items()}
-    if excluded := description.tables.describe_excluded():
-        measurements = Measurements(measurements.tables, (excluded, *measurements.remarks))
+            checksums |= {name: sha256_of(path) for name, path in read.files.items()}
+    if sentence := description.tables.describe_excluded():
+        measurements = replace(measurements, remarks=(sentence, *measurements.remarks))
     faults.refuse()
     if channels and not any(kind.takes_channels for kind, _ in iterate_tables(measurements)):
         raise DescriptionError(
@@ -261,15 +268,4 @@ def read_dataset(
                 refuse_far_forces(columns, table.origin)
             kind.check(table, description, measurements)
     faults.refuse()
-    return Dataset(description, measurements, checksums, accounts)
-
-
-def _sha256(path: Path) -> str:
-    """Return the checksum of a file, or of the names and contents of those in a folder."""
-    if path.is_dir():
-        inside = sorted(file for file in path.rglob("*") if file.is_file())
-        listed = "".join(f"{_sha256(file)}  {file.relative_to(path)}\n" for file in inside)
-        return hashlib.sha256(listed.encode(errors="surrogateescape")).hexdigest()
-    refuse_special(path)
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return Dataset(description, measurements, checksums, accounts, folder)

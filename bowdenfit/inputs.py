@@ -1,6 +1,7 @@
 """What may be opened at all: regular files of a size that fits what they are, found by patterns that end."""
 
 import errno
+import hashlib
 import math
 import os
 import re
@@ -58,6 +59,22 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
     for is_so, what in _SPECIAL.items():
         if is_so(mode):
             raise error(f"{path.name} is {what}, not a file; copy what it gives into a file, and name that.")
+
+
+def sha256_of(path: Path) -> str:
+    """Return the checksum of a file, or of the names and contents of those in a folder.
+
+    Raises:
+        DatasetError: It is neither.
+        OSError: It cannot be read.
+    """
+    if path.is_dir():
+        inside = sorted(file for file in path.rglob("*") if file.is_file())
+        listed = "".join(f"{sha256_of(file)}  {file.relative_to(path)}\n" for file in inside)
+        return hashlib.sha256(listed.encode(errors="surrogateescape")).hexdigest()
+    refuse_special(path)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextmanager

@@ -45,6 +45,8 @@ class Curve(ABC):
     """What the summary calls a table of its derived quantities."""
     not_limited: ClassVar[str] = ""
     """What it means that a derived quantity goes to infinity; empty where none can."""
+    example: ClassVar[tuple[float, ...]] = ()
+    """Coefficients of a typical curve, for a small picture of the family; empty without one."""
     has_family: ClassVar[bool] = True
     """Whether the curve is of a family that an angle may depart from."""
 
@@ -141,6 +143,7 @@ class GaussianCurve(Curve):
     """A bell, `A exp(-((l - B)/C)^2)`, in log-quadratic coordinates (on-body paper, equation 8; see `physics.geometry`)."""
 
     coefficients = ("a", "b", "c")
+    example = (0.0, 0.8, 3.0)
     heading = "Gaussian curves A exp(-((l - B)/C)^2)"
     not_limited = "the data also allow an exponential, for which A, B and C are infinite; use a, b and c above."
 
@@ -177,6 +180,7 @@ class LineCurve(Curve):
     """A straight line between the angles at both ends of the range, neither of which is negative."""
 
     coefficients = ("start", "end")
+    example = (0.15, 1.0)
     heading = "Straight lines: angle in the middle of the range, and slope"
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
@@ -212,6 +216,7 @@ class LogisticCurve(Curve):
     """A rise or fall between 0 and a plateau, `A / (1 + exp(-(l - B)/C))` (Verhulst 1838; see `physics.geometry`)."""
 
     coefficients = ("a", "k", "s")
+    example = (0.0, 5.0, 0.5)
     heading = "Logistic curves A / (1 + exp(-(l - B)/C))"
     not_limited = "the data also allow an exponential, for which A and B are infinite; use a, k and s above."
 
@@ -246,6 +251,7 @@ class SmoothCurve(Curve):
     """A smooth curve of no family: a mean angle over the range, and polynomials about it (see `cable.departure`)."""
 
     coefficients = ("mean", *(f"departure_{degree}" for degree in SMOOTH_SHARES))
+    example = (0.6, 0.1, -0.05, 0.2, 0.05, 0.0)
     heading = "Smooth curves"
     has_family = False
 

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import version
@@ -34,6 +34,7 @@ from bowdenfit.cli.terminal import NoReaderError, say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES, read_answers
+from bowdenfit.results.data_changes import find_data_changes
 from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.results.folder import refuse_unwritable
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
@@ -160,6 +161,7 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
         key = COEFFICIENT_TROUBLES if verb.needs_coefficients else TROUBLES
         troubles = answers[key] if key in answers else _list_troubles(request[first], source, verb.needs_coefficients)
         reply = _add_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
+    reply = replace(reply, notes=(*reply.notes, *_describe_data_changes(source)))
     _print_answer(reply, form)
     for note in reply.notes:
         say(note, err=True)
@@ -253,6 +255,14 @@ def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Repl
     """Return the reply with a warning and an exit code if the fit is not to be trusted."""
     warning = f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}."
     return replace(reply, notes=(*reply.notes, warning), exit_code=reply.exit_code or NOT_TRUSTED) if troubles else reply
+
+
+def _describe_data_changes(source: Any) -> Iterator[str]:
+    """Yield which data have changed since each of the fits that a verb was asked of."""
+    for folder in source if isinstance(source, tuple | list) else (source,):
+        is_fit = isinstance(folder, Path) and (folder / FIT_FILE).is_file()
+        if is_fit and (words := find_data_changes(folder).describe(f"the fit {folder}")):
+            yield words
 
 
 def _to_json(reply: Reply) -> str:

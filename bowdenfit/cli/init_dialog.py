@@ -41,7 +41,7 @@ class Terminal:
         """Ask until there is a valid answer, and return it."""
         say("")
         say(filled(question.words + (" (y or n)" if question.form == "yes or no" else "")))
-        for i, option in enumerate(question.options, start=1):
+        for i, option in enumerate(question.options if question.form != "word" else (), start=1):
             say(filled(f"{i}  {option}", "  "))
         if question.default is None:
             such = "" if question.options else f"such as {question.example}; "

@@ -1,6 +1,5 @@
 """What a description says of measurements: tables, whose kinds add settings of their own, and recordings."""
 
-from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -17,6 +16,10 @@ class TableSettings(Frozen):
     """What all that stands under [tables] has in common."""
 
     missing: tuple[Code, ...] = ()
+
+    def list_excluded(self) -> list[tuple[tuple[str, str], int, str]]:
+        """Return what is left out by the user: what one and several are called, how many, and which and why in words."""
+        return []
 
     @property
     def fits_offsets(self) -> bool:
@@ -35,6 +38,21 @@ class ExcludedRows(Frozen):
     rows: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1, max_length=_MOST_EXCLUDED)]
     reason: Annotated[Text, Field(min_length=1)]
     file: str | None = None
+
+
+class ExcludedSpan(Frozen):
+    """A stretch of a recording that its user leaves out, in seconds of the recording's clock, and why."""
+
+    start: Finite
+    end: Finite
+    reason: Annotated[Text, Field(min_length=1)]
+    file: str | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "ExcludedSpan":
+        if not self.start < self.end:
+            raise ValueError("a stretch that is left out must start before it ends; start and end are in seconds")
+        return self
 
 
 class Table(TableSettings):
@@ -60,11 +78,14 @@ class Table(TableSettings):
             raise ValueError('exclude must say of which file its rows are, { file = "name.csv", rows = [7], reason = "..." }')
         return self
 
-    def describe_excluded(self) -> Iterator[str]:
-        """Yield which rows are left out and why, such as "forces.csv, rows 7 and 9 (the rope jumped)"."""
+    def list_excluded(self) -> list[tuple[tuple[str, str], int, str]]:
+        """Return the rows that are left out, such as "forces.csv, rows 7 and 9 (the rope jumped)"."""
+        excluded = []
         for part in self.exclude:
-            rows = listed([str(row) for row in sorted(set(part.rows))])
-            yield f"{part.file or self.file or self.files}, row{'s' * (len(set(part.rows)) > 1)} {rows} ({part.reason})"
+            rows = sorted(set(part.rows))
+            words = f"row{'s' * (len(rows) > 1)} {listed([str(row) for row in rows])} ({part.reason})"
+            excluded.append((("reading", "readings"), len(rows), f"{part.file or self.file or self.files}, {words}"))
+        return excluded
 
 
 class Tables(Frozen):
@@ -84,10 +105,10 @@ class Tables(Frozen):
 
     def describe_excluded(self) -> str:
         """Return how many readings the user leaves out, which, and why, in a sentence; empty where all are used."""
-        tables = [settings for settings in self.stated.values() if isinstance(settings, Table)]
-        count = sum(len(set(part.rows)) for settings in tables for part in settings.exclude)
-        places = "; ".join(place for settings in tables for place in settings.describe_excluded())
-        return f"{counted(count, 'reading')} left out by the user: {places}." if count else ""
+        excluded = [part for settings in self.stated.values() for part in settings.list_excluded()]
+        totals = {word: sum(count for other, count, _ in excluded if other == word) for word, _, _ in excluded}
+        counts = listed([counted(count, *word) for word, count in totals.items()])
+        return f"{counts} left out by the user: {'; '.join(place for _, _, place in excluded)}." if excluded else ""
 
 
 class ForceLimits(Frozen):

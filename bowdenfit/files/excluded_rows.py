@@ -1,11 +1,13 @@
 """Rows of a table that are left out because their user says so."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column
+from bowdenfit.files.row_account import ExcludedReading
 from bowdenfit.files.tables import RawTable
 from bowdenfit.words import few
 
@@ -44,7 +46,18 @@ def leave_out_rows(
             table,
             rows=tuple(row for row, keeps in zip(table.rows, retained, strict=True) if keeps),
             errors={heading: keep(cells) for heading, cells in table.errors.items()},
-            lines=table.lines.without_rows(reasons),
+            lines=table.lines.without_rows(reasons, tuple(_read_rows(table.file, columns, sorted(reasons)))),
         ),
         {name: replace(column, cells=keep(column.cells)) for name, column in columns.items()},
     )
+
+
+def _read_rows(file: str, columns: Mapping[str, Column], rows: Sequence[int]) -> Iterator[ExcludedReading]:
+    """Yield the numbers in some rows, of those cells that hold one; whatever else is in them is not looked at."""
+    for row in rows:
+        values = {}
+        for name, column in columns.items():
+            for cell in (cell for cell in column.cells if cell.row == row):
+                with suppress(DatasetError):
+                    values[name] = column.value(cell)
+        yield ExcludedReading(file, row, values)

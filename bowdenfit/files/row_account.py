@@ -42,6 +42,21 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
+class ExcludedReading:
+    """A row of readings that its user leaves out.
+
+    Args:
+        file: Name of its file, without folders.
+        row: Its number there.
+        values: Numbers in it by quantity, in internal units.
+    """
+
+    file: str
+    row: int
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
 class RowAccount:
     """Where the rows of a file went; `read`, `headings` and `left_out` together are all of them.
 
@@ -53,6 +68,7 @@ class RowAccount:
         left_out: All others.
         beside: Row and text of remarks in rows that are read, beside the table.
         note: Remark on its cells, as a clause; empty without.
+        excluded: Readings that the user leaves out.
     """
 
     file: str
@@ -62,6 +78,7 @@ class RowAccount:
     left_out: tuple[LeftOut, ...] = ()
     beside: tuple[tuple[int, str], ...] = ()
     note: str = ""
+    excluded: tuple[ExcludedReading, ...] = ()
 
     @property
     def accounted(self) -> int:
@@ -82,14 +99,16 @@ class RowAccount:
         texts = few([f"{shown(text)} in row {row}" for row, text in self.beside], _TEXTS)
         return f"next to the table: {texts}"
 
-    def without_rows(self, reasons: Mapping[int, str]) -> "RowAccount":
+    def without_rows(self, reasons: Mapping[int, str], excluded: tuple[ExcludedReading, ...] = ()) -> "RowAccount":
         """Return the account where some of the rows that are read are left out after all.
 
         Args:
             reasons: Why each of them is, by its number.
+            excluded: What is in those that the user leaves out.
         """
         left_out = _group_by_reason({row: (reason, "") for row, reason in reasons.items()})
-        return replace(self, read=self.read - len(reasons), left_out=(*self.left_out, *left_out))
+        excluded = (*self.excluded, *excluded)
+        return replace(self, read=self.read - len(reasons), left_out=(*self.left_out, *left_out), excluded=excluded)
 
 
 def make_account(

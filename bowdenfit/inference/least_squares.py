@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.errors import ConvergenceError
+from bowdenfit.errors import ConvergenceError, UsageError, suggest_name
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.disagreement import Disagreement, find_disagreements
 from bowdenfit.inference.interval import NORMAL_90
@@ -25,11 +25,11 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import PINS, LocalMinimum, find_lowest_minimum, find_rivals, range_of_minima
 from bowdenfit.inference.objective import Objective, Problem, Solution, noise_scales, sum_of_squares, total_squares
 from bowdenfit.inference.profiles import UNKNOWN_LIMITS, ProfileIntervals
-from bowdenfit.inference.scalar_priors import clipped_z
+from bowdenfit.inference.scalar_priors import FARTHEST, clipped_z, value_at, z_at
 from bowdenfit.inference.solver import ROUGH
 from bowdenfit.parameters.priors import LogNormal
-from bowdenfit.parameters.space import Parameter
-from bowdenfit.words import significant
+from bowdenfit.parameters.space import Parameter, ParameterSpace
+from bowdenfit.words import shown, significant
 
 UNDETERMINED = "the measurements do not determine it"
 KINKED = "no profile interval, since the solver is stuck at kinks of the sum of squares on the way to its ends"
@@ -126,15 +126,22 @@ class MaximumPosterior:
     covariance: np.ndarray
 
 
-def find_maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPosterior:
+def find_maximum_posterior(
+    posterior: LogDensity, objective: Objective, start: np.ndarray | None = None
+) -> MaximumPosterior:
     """Find the maximum of the posterior with noise scales at their prior medians, from every start that a parameter names.
+
+    Args:
+        posterior: The posterior.
+        objective: Its compiled objective.
+        start: One more z to start from; see `read_start`.
 
     Raises:
         ConvergenceError: The residuals are not finite at the start.
     """
     n = posterior.model.space.size
     problem = Problem(posterior, objective, with_priors=True)
-    starts = product(*map(_starting_z, posterior.model.space.free))
+    starts = [*product(*map(_starting_z, posterior.model.space.free)), *([] if start is None else [start])]
     solution = min((problem.solve(np.array(start)) for start in starts), key=_squares_with_priors)
     if not all(np.all(np.isfinite(r)) for r in solution["residuals"].values()):
         raise ConvergenceError(
@@ -144,6 +151,36 @@ def find_maximum_posterior(posterior: LogDensity, objective: Objective) -> Maxim
     # The prior of each z has unit information; a noise scale gets that alone, its residuals say nothing here.
     information = solution["jacobian"].T @ solution["jacobian"] + np.eye(n)
     return MaximumPosterior(solution["z"], np.linalg.inv(information))
+
+
+def read_start(space: ParameterSpace, values: Mapping[str, float]) -> np.ndarray | None:
+    """Return z at which some parameters have stated values, and all others their first start; None where none is stated.
+
+    Args:
+        space: The parameters.
+        values: Values by name, in the units in which they are shown.
+
+    Raises:
+        UsageError: There is no such parameter that is searched for, or it can never have that value.
+    """
+    z = np.array([_starting_z(parameter)[0] for parameter in space.free])
+    for name, value in values.items():
+        if name not in space.index:
+            why = "is fixed" if name in {p.name for p in space.fixed} else "is not a parameter of this fit"
+            raise UsageError(f"start: {shown(name)} {why}{suggest_name(name, list(space.index))}")
+        parameter = space.free[space.index[name]]
+        if parameter.role == "noise":
+            raise UsageError(f"start: {name} is the size of the noise, which the search holds; leave it out.")
+        at = z_at(parameter.prior, value / parameter.shown_scale)
+        if not abs(at) <= FARTHEST:
+            low, high = (value_at(parameter.prior, end) * parameter.shown_scale for end in (-FARTHEST, FARTHEST))
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            raise UsageError(
+                f"start: {name} = {value:g}{unit} is outside of what its prior ({parameter.prior_text}) allows, "
+                f"{low:.3g} to {high:.3g}{unit}; start from a value in between, or state another prior."
+            )
+        z[space.index[name]] = at
+    return z if values else None
 
 
 def _starting_z(parameter: Parameter) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.parameters.priors import Prior
 
-_FARTHEST = 6.0  # z where a solve may start: two in a thousand million draws of a prior lie beyond
+FARTHEST = 6.0  # z where a solve may start: two in a thousand million draws of a prior lie beyond
 
 
 def value_at(prior: Prior, z: float) -> float:
@@ -27,7 +27,7 @@ def z_at(prior: Prior, value: float) -> float:
 
 def clipped_z(prior: Prior, value: float) -> float:
     """Return z at a parameter value, clipped to where a solve may start or a noise scale may be pinned."""
-    return float(np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST))
+    return float(np.clip(z_at(prior, value), -FARTHEST, FARTHEST))
 
 
 def _apply(prior: Prior, way: str, number: float) -> float:

@@ -1,7 +1,8 @@
 """Files of tables: where a table is read from, what reading gives, and what `bowdenfit init` asks about such files."""
 
+import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -118,22 +119,27 @@ class Source:
         codes = MissingCodes(self.settings.missing)
         table = codes.mark(read_table(path, sheet=sheet))
         table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)
-        table, columns = leave_out_rows(table, columns, self._find_excluded(path))
+        excluded = {row: f"{BY_USER}{part.reason}" for part in self.find_excluded(path) for row in part.rows}
+        table, columns = leave_out_rows(table, columns, excluded)
         return leave_out_coded_rows(table, columns, wanted, codes)
 
-    def _find_excluded(self, path: Path) -> dict[int, str]:
-        """Return why each of the rows of a file is left out that its user excludes, by number.
+    def find_excluded(self, path: Path, files: Sequence[Path] = ()) -> list[Any]:
+        """Return the entries of `exclude` that leave out parts of a file.
+
+        Args:
+            path: The file.
+            files: All files of the table; those of the settings if omitted.
 
         Raises:
             DescriptionError: It is not clear of which file they are, or the table has no file of that name.
         """
-        names = {self.name_of(file) for file in self.files}
-        excluded: dict[int, str] = {}
+        names, excluded = {self.name_of(file) for file in files or self.files}, []
         for part in self.settings.exclude:
             if part.file is None and len(names) > 1:
+                example = json.dumps(min(names))
                 raise DescriptionError(
-                    f"cable.toml, tables.{self.kind}, exclude: the table has {len(names)} files; say of which the rows are, "
-                    f'such as {{ file = "{min(names)}", rows = {list(part.rows)}, reason = "..." }}.'
+                    f"cable.toml, tables.{self.kind}, exclude: the table has {len(names)} files; say of which one this is, "
+                    f'such as {{ file = {example}, ..., reason = "{part.reason}" }}.'
                 )
             if part.file is not None and part.file not in names:
                 raise DescriptionError(
@@ -141,7 +147,7 @@ class Source:
                     f"{suggest_name(part.file, sorted(names))}"
                 )
             if part.file in (None, self.name_of(path)):
-                excluded |= dict.fromkeys(part.rows, f"{BY_USER}{part.reason}")
+                excluded.append(part)
         return excluded
 
     def name_of(self, path: Path) -> str:

@@ -3,13 +3,14 @@
 The table of a kind that nobody else looks at stands with its kind; recordings are `bowdenfit.recordings.recording.Recordings`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from bowdenfit.description import QuantityValue, Table
 from bowdenfit.display import Display
+from bowdenfit.files.row_account import ExcludedReading
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
@@ -23,10 +24,12 @@ class Measurements(Display):
     Args:
         tables: At most one of a class.
         remarks: Assumptions that were made, in sentences.
+        excluded: Readings that the user leaves out, by the name of their kind.
     """
 
     tables: tuple[Any, ...] = ()
     remarks: tuple[str, ...] = ()
+    excluded: dict[str, tuple[ExcludedReading, ...]] = field(default_factory=dict)
 
     def sentences(self) -> list[str]:
         """Return which tables there are."""
@@ -35,6 +38,16 @@ class Measurements(Display):
     def table(self, of: type[AnyTable]) -> AnyTable | None:
         """Return the table of a class; None if nothing of that kind was measured."""
         return next((table for table in self.tables if type(table) is of), None)
+
+    def excluded_points(self, kind: str, x: str, y: str) -> np.ndarray:
+        """Return two quantities of the readings that the user leaves out, of those that have both; one row each.
+
+        Args:
+            kind: Name of their kind.
+            x, y: Names of the quantities.
+        """
+        readings = (reading.values for reading in self.excluded.get(kind, ()))
+        return np.array([(values[x], values[y]) for values in readings if x in values and y in values]).reshape(-1, 2).T
 
     def with_tables(self, *tables: Any) -> "Measurements":
         """Return the measurements with other tables in place of those of their classes; None changes nothing."""

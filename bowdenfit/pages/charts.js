@@ -130,7 +130,7 @@
       const chart = this.charts[this.current], series = seriesOf(chart), text = color("ink"), grid = color("rule");
       this.plot?.destroy();
       const tables = chart.groups.map(group => [group.x, ...group.series.map(one => one.values)]);
-      const data = uPlot.join(tables, tables.map(table => table.map(() => 1)));
+      const data = uPlot.join(tables, tables.map(table => table.map(() => 2)));
       const named = chart.names.length > 0, counts = data[0].every(Number.isInteger);
       const picked = chart.groups.some(group => group.series.some(one => one.keys));
       this.ends = named ? [0.5, chart.names.length + 0.5] : [data[0][0], data[0].at(-1)];

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from bowdenfit.parameters.symbols import to_plain_text
 from bowdenfit.words import counted
 
@@ -22,6 +24,12 @@ def describe_curve(has_draws: bool, quantity: str = "") -> str:
 def describe_strip(unit_words: str) -> str:
     """Return the sentence that explains a strip of residuals."""
     return f"Strip below: residuals, reading minus line, {unit_words}; if the model fits, they scatter evenly about zero."
+
+
+def describe_left_out(points: np.ndarray) -> str:
+    """Return the sentence that explains readings which the user leaves out, x in the first row; empty without any."""
+    count = points.shape[-1]
+    return f"Gray circles: {counted(count, 'reading')} left out by the user." if count else ""
 
 
 def count_shown(shown: int, total: int, noun: str, several: str = "") -> str:

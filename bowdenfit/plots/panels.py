@@ -20,7 +20,7 @@ from bowdenfit.plots.layout import (
     room_for_labels,
     text_width,
 )
-from bowdenfit.plots.style import MEDIUM, SMALL, WIDE
+from bowdenfit.plots.style import GRAY, LEFT_OUT, MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -177,7 +177,7 @@ def show_plain_numbers(axes: Axes, which: str) -> None:
 
 
 def draw_marks(
-    axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
+    axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None, size: float = 3.0
 ) -> None:
     """Draw as many markers as can be distinguished; those beyond the limits or not finite are drawn at the edge.
 
@@ -187,6 +187,7 @@ def draw_marks(
         mark: Marker and color.
         label: Entry of the legend.
         fill: Color of the inside, if another.
+        size: Size of a mark [pt].
     """
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     y = np.clip(np.where(np.isfinite(y), y, low), low, high)
@@ -195,7 +196,7 @@ def draw_marks(
     _, first = np.unique(column * (up + 1) + row, return_index=True)
     marker, color = mark
     axes.plot(
-        x[first], y[first], marker, color=color, markersize=3, markerfacecolor=fill or color, markeredgewidth=0.8,
+        x[first], y[first], marker, color=color, markersize=size, markerfacecolor=fill or color, markeredgewidth=0.8,
         clip_on=False, zorder=4, label=label, rasterized=len(first) > MARK_GRID[1],
     )  # fmt: skip
 
@@ -209,3 +210,16 @@ def extremes(values: np.ndarray, most: int) -> np.ndarray:
     start = size * np.arange(len(padded))
     indices = np.concatenate([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
     return np.unique(np.minimum(indices, len(values) - 1))
+
+
+def draw_left_out(axes: Axes, points: np.ndarray) -> None:
+    """Draw readings that the user leaves out gray and open; those beyond the limits, which must be set, at the edge.
+
+    Args:
+        axes: Panel to draw on.
+        points: Their places, x in the first row and y in the second.
+    """
+    if points.size:
+        x, y = points
+        limits = axes.get_xlim()
+        draw_marks(axes, np.clip(x, min(limits), max(limits)), y, ("o", GRAY), LEFT_OUT, "white", LEGEND_MARK)

@@ -34,6 +34,7 @@ DOTS_PER_INCH = 160  # a judgement: sharp on a screen, and small enough to be ma
 IN_WORDS = {"log rad": "log angle"}  # units that few would understand
 EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"
 WIDE_INTERVAL, NARROW_INTERVAL, MEDIAN, LEAST_SQUARES = "90 % interval", "50 % interval", "Median", "Least squares"
+LEFT_OUT = "Left out by the user"  # readings that no fit uses, gray
 
 FAMILIES = ["DejaVu Sans", "Bitstream Vera Sans", "Verdana", "Arial"]  # in SVG; here always the first
 SETTINGS: dict[Any, Any] = {

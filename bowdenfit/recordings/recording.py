@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from bowdenfit.types import Flags, Labels, Vector
+from bowdenfit.types import Flags, Labels, OtherFlags, OtherVector, Vector
 
 PULL, RETURN, SWITCH = 1, -1, 0
 
@@ -30,6 +30,24 @@ def describe_exchange(channels: tuple[str, str]) -> str:
 
 
 @dataclass(frozen=True)
+class ExcludedStretches:
+    """Stretches of a recording that its user leaves out, whose forces are missing in the recording itself.
+
+    Args:
+        spans: Start and end of each, both included [s].
+        input_force, output_force: Forces as they were read, on the clocks of the recording [N].
+    """
+
+    spans: tuple[tuple[float, float], ...]
+    input_force: Float[np.ndarray, " of_input"]
+    output_force: Float[np.ndarray, " of_output"]
+
+    def covers(self, time: OtherVector) -> OtherFlags:
+        """Return whether each time is in one of the stretches."""
+        return np.any([(time >= start) & (time <= end) for start, end in self.spans], axis=0)
+
+
+@dataclass(frozen=True)
 class RawRecording:
     """One recording as read: samples of both load cells, each with its own clock, in internal units.
 
@@ -45,6 +63,7 @@ class RawRecording:
         loop: Whether the forces are those of a pull-pull loop, differences of two tensions: of either sign.
         input_start, output_start: Unix times at which the clocks are 0 [s]; None where they have no dates (`Channel.start`).
         channels: Names that the channels of input and output force have in the file; empty if not read from one, or torques.
+        excluded: Stretches that the user leaves out; None without any.
     """
 
     name: str
@@ -59,6 +78,7 @@ class RawRecording:
     input_start: float | None = None
     output_start: float | None = None
     channels: tuple[str, str] = ("", "")
+    excluded: ExcludedStretches | None = None
 
 
 @dataclass(frozen=True)
@@ -66,7 +86,7 @@ class FlaggedSamples:
     """Samples that were left out, for figures and for the account; at most a few hundred of each kind are kept.
 
     Args:
-        kind: "dropout", "spike", "saturated" or "quiet", one a sample.
+        kind: "dropout", "spike", "saturated", "quiet" or "by the user", one a sample.
         time: When [s].
         input_force, output_force: Readings [N].
     """
@@ -83,7 +103,7 @@ class Account:
 
     Args:
         counts: Samples of the common clock by where they went: "used", "dropout", "spike", "saturated", "quiet",
-            "no overlap"; their sum is `samples`.
+            "by the user", "no overlap"; their sum is `samples`.
         samples: Samples in the recording: those of the channel with more of them.
         rate: Samples a second of the common clock [1/s].
         bandwidth: Frequency up to which the forces move together, above which there is only noise [Hz].

@@ -115,12 +115,14 @@ class Provenance(Display):
         versions: Versions of bowdenfit, Python and the libraries that computed.
         stage_times: Seconds by stage.
         created: Date and time, UTC.
+        start: Values that the search was told to begin at too, by parameter, in the units in which they are shown.
     """
 
     seed: int
     versions: dict[str, str]
     stage_times: dict[str, float] = field(default_factory=dict)
     created: str = ""
+    start: dict[str, float] = field(default_factory=dict)
 
     def sentences(self) -> list[str]:
         """Return the seed, and what computed."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import BowdenfitError, StoreError
+from bowdenfit.files.row_account import ExcludedReading
 from bowdenfit.inference.diagnostics import as_chains
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
@@ -20,6 +21,7 @@ from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.outputs import write_text
 from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, record_figure_data, write_answers
+from bowdenfit.results.data_changes import locate_data_set
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page
 from bowdenfit.results.netcdf import (
     DERIVED,
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
 
 SCHEMA = 7  # counted up with every change of what files mean
 LOG_POSTERIOR, WALKER = "lp", "walker"
+EXCLUDED = "excluded"  # readings that the user leaves out, next to the tables
 _SAMPLERS = "emcee", "nuts", "importance"
 _WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
@@ -72,10 +75,11 @@ def save(
         else:
             write_groups(folder / POSTERIOR, *posterior_page(fit))
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
-        page = _fit_text(_fit_page(fit) | {"posterior_crc32": file_checksum(folder / POSTERIOR)}, fit.dataset.measurements)
+        page = _fit_page(fit) | locate_data_set(fit.dataset.folder, folder)
+        text = _fit_text(page | {"posterior_crc32": file_checksum(folder / POSTERIOR)}, fit.dataset.measurements)
         (folder / FIGURE_DATA).unlink(missing_ok=True)
-        write_answers(folder, answers, page)
-        write_text(folder / FIT, page)
+        write_answers(folder, answers, text)
+        write_text(folder / FIT, text)
 
 
 def save_figure_data(figures: Mapping[str, Any], folder: Path) -> None:
@@ -213,7 +217,8 @@ def _fit_text(page: Mapping[str, Any], measurements: Measurements) -> str:
 
 def _measurements_page(measurements: Measurements) -> dict[str, Any]:
     tables = {kind.name: table for kind, table in iterate_tables(measurements)}
-    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, "remarks": measurements.remarks})
+    others = {"remarks": measurements.remarks, EXCLUDED: measurements.excluded}
+    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, **others})
     return page
 
 
@@ -224,7 +229,8 @@ def _posterior_page(posterior: Draws) -> dict[str, Any]:
 
 def _measurements(page: Mapping[str, Any]) -> Measurements:
     tables = (deserialize(kind.table | None, page.get(name)) for name, kind in KINDS.items())
-    return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]))
+    excluded = deserialize(dict[str, tuple[ExcludedReading, ...]], page.get(EXCLUDED, {}))  # no fit had it once
+    return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]), excluded)
 
 
 def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:

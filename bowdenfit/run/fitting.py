@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -20,7 +21,13 @@ from bowdenfit.inference.coordinates import Conditional
 from bowdenfit.inference.draws import PREDICTED_GROUPS, compile_replicator, for_each_draw, imply_groups, value_function
 from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.importance import compile_densities
-from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
+from bowdenfit.inference.least_squares import (
+    LeastSquares,
+    MaximumPosterior,
+    find_maximum_posterior,
+    fit_least_squares,
+    read_start,
+)
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.resources import refuse_shortage
@@ -65,18 +72,19 @@ class Stopwatch:
 
 
 @jax.enable_x64(True)
-def fit_classically(data: Dataset, seed: int) -> Fit:
+def fit_classically(data: Dataset, seed: int, values: Mapping[str, float] = MappingProxyType({})) -> Fit:
     """Fit by least squares alone, without a posterior.
 
     Args:
         data: Data set to fit.
         seed: Random seed, for the record.
+        values: Values at which the search begins too; see `read_start`.
     """
     watch, density = Stopwatch(), LogDensity(build_model(data))
-    objective, start = find_maximum(density, watch)
+    objective, start = find_maximum(density, watch, read_start(density.model.space, values))
     squares = estimate(density, objective, start, watch)
     reasons = () if squares.converged else (squares.message,)
-    return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
+    return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch, values))
 
 
 @jax.enable_x64(True)
@@ -86,6 +94,7 @@ def fit_posterior(
     start_checkpoint: Callable[[], Path | None],
     resume: bool,
     report: Callable[..., None] | None,
+    values: Mapping[str, float] = MappingProxyType({}),
 ) -> Fit:
     """Fit by least squares and sample the posterior.
 
@@ -97,14 +106,16 @@ def fit_posterior(
         start_checkpoint: Called before the first draw; returns the checkpoint.
         resume: Whether the checkpoint holds draws to go on from.
         report: Called after every block of draws with where sampling stands.
+        values: Values at which the search for the maximum begins too; see `read_start`.
 
     Raises:
-        BowdenfitError: Coefficients cannot be told apart, or draws would not fit into memory.
+        BowdenfitError: Coefficients cannot be told apart, a value cannot be, or draws would not fit into memory.
     """
     watch, beside = Stopwatch(), Stopwatch(announces=False)
     density, settings = LogDensity(build_model(data)), data.description.sampler
+    first = read_start(density.model.space, values)
     with ThreadPoolExecutor(1) as classical, ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as importing:
-        maximum = classical.submit(find_maximum, density, beside)
+        maximum = classical.submit(find_maximum, density, beside, first)
         refuse_undetermined(density.model, lambda: maximum.result()[1])
         refuse_large_sampling(density.model)
         squares = classical.submit(lambda: estimate(density, *maximum.result(), beside))  # one thread: after the other
@@ -120,16 +131,18 @@ def fit_posterior(
         posterior, reasons = draw_posterior(programs, request, watch)
         least = squares.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.seconds.items()}
-    return Fit(data, least, posterior, not reasons, reasons, provenance(seed, watch), programs.draw_programs)
+    return Fit(data, least, posterior, not reasons, reasons, provenance(seed, watch, values), programs.draw_programs)
 
 
-def find_maximum(density: LogDensity, watch: Stopwatch) -> tuple[Objective, MaximumPosterior]:
-    """Return the compiled objective of least squares, and the maximum of the posterior."""
+def find_maximum(
+    density: LogDensity, watch: Stopwatch, start: np.ndarray | None = None
+) -> tuple[Objective, MaximumPosterior]:
+    """Return the compiled objective of least squares, and the maximum of the posterior, searched from one more start too."""
     with jax.enable_x64(True):  # a setting of each thread
         with watch.stage("compiling least squares"):
             objective = make_objective(density)
         with watch.stage("finding the maximum of the posterior"):
-            return objective, find_maximum_posterior(density, objective)
+            return objective, find_maximum_posterior(density, objective, start)
 
 
 def estimate(density: LogDensity, objective: Objective, start: MaximumPosterior, watch: Stopwatch) -> LeastSquares:
@@ -149,9 +162,10 @@ def _with_memory(report: Callable[..., None] | None) -> Callable[..., None]:
     return report_with_memory
 
 
-def provenance(seed: int, watch: Stopwatch) -> Provenance:
-    """Return seed, versions and times of a fit that ends now."""
-    return Provenance(seed, dict(installed_versions()), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
+def provenance(seed: int, watch: Stopwatch, values: Mapping[str, float]) -> Provenance:
+    """Return seed, versions, times and starting values of a fit that ends now."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return Provenance(seed, dict(installed_versions()), watch.seconds, now, dict(values))
 
 
 def choose_samplers(density: LogDensity) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """`bf.fit` and `bowdenfit fit`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,7 @@ from warnings import warn
 from cyclopts import Parameter
 
 from bowdenfit import run
-from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Purpose, Seed, read_first
+from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Purpose, Seed, numbers_by_name, read_first
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
@@ -37,6 +37,9 @@ def fit(
     sampler: Annotated[Sampler | None, Parameter(show_default="as in cable.toml, else by the model")] = None,
     figures: Annotated[bool, Parameter(negative="--no-figures")] = True,
     seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
+    start: Annotated[
+        Mapping[str, float] | None, Parameter("--start", metavar="NAME=VALUE"), numbers_by_name("mu1=0.1", "parameter")
+    ] = None,
     resume: bool = False,
     force: bool = False,
     purpose: Purpose = "design",
@@ -56,6 +59,8 @@ def fit(
         sampler: Ensembles of walkers, NUTS for many parameters or narrow posteriors, or both, one to check the other.
         figures: Draw the figures.
         seed: Random seed.
+        start: Value of a parameter, in the unit in which it is shown, at which the search for the best fit begins too, besides
+            its usual starts; may be repeated.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
         purpose: What the command's first line and exit code are about: "design", the best length, or "coefficients".
@@ -78,9 +83,9 @@ def fit(
             keep_compiled_programs()
             if mcmc:
                 checkpoint = partial(run.start_checkpointing, folder, data, seed, resume)
-                result = run.fit_posterior(data, seed, checkpoint, resume, show)
+                result = run.fit_posterior(data, seed, checkpoint, resume, show, start or {})
             else:
-                result = run.fit_classically(data, seed)
+                result = run.fit_classically(data, seed, start or {})
             for sentence in run.save_results(result, folder) if folder is not None else ():
                 report(sentence)
             if folder is not None and result.converged:

@@ -1,15 +1,25 @@
 """Readings that a description leaves out are not read, and are named with their reason wherever data are described."""
 
+import re
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
+from figure_words import assert_readable
 from half_turn_bench import describe_half_turn
 
 import bowdenfit as bf
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.plots.style import LEFT_OUT
 from bowdenfit.questions.check.data_set_words import describe_data_set
+from bowdenfit.questions.figures import FIGURES, collect_figure_data
+from bowdenfit.questions.length.efficiency_figure import make_efficiency_chart
+from bowdenfit.questions.summary import forces_figure
 from bowdenfit.questions.summary.brief import summary_text
 
+DATASETS = Path(__file__).parents[2] / "datasets"
 HEAD = "input_force_N,output_force_N,run\n"
 ROWS = ["20,15.2,1", "40,30.1,1", "60,45.6,1", "20,15.0,2", "40,30.9,2", "60,46.0,2", "20,14.8,3", "40,29.9,3", "60,44.6,3"]
 
@@ -89,3 +99,33 @@ def test_of_several_files_the_entry_says_which(bench):
         bf.read(bench('{ rows = [3], reason = "x", file = "c.csv" }', files=files))
     read = forces_of(bench('{ rows = [3], reason = "x", file = "b.csv" }', files=files))
     assert np.array_equal(read, np.delete(forces_of(bench("", files=files)), 10, axis=0))
+
+
+def test_figures_of_a_fit_show_them_gray_also_when_it_is_read_back(bench, tmp_path):
+    folder = bench('{ rows = [3, 8, 10], reason = "the rope jumped" }', [*ROWS[:-1], "60,slipped,3"])
+    made = bf.fit(folder, mcmc=False, output=tmp_path / "fit", figures=False)
+    for fit in (made, bf.load(tmp_path / "fit")):
+        assert [(r.file, r.row) for r in fit.dataset.measurements.excluded["forces"]] == [("forces.csv", n) for n in (3, 8, 10)]
+        data = forces_figure.data(fit)
+        assert data.left_out.T.tolist() == [[40, 30.1], [20, 14.8]]
+        assert LEFT_OUT in forces_figure.draw(data).axes[0].get_legend_handles_labels()[1]
+        assert "2 readings left out by the user" in forces_figure.caption(data)
+
+
+@pytest.mark.extended
+def test_each_figure_of_a_table_shows_those_of_the_table(tmp_path):
+    shown = {}
+    for name in ("on-body-exoskeleton", "synthetic-haptic-loop"):
+        folder = shutil.copytree(DATASETS / name, tmp_path / name)
+        text = (folder / "cable.toml").read_text()
+        left_out = 'exclude = [{ rows = [4], reason = "the rope jumped" }]'
+        text = re.sub(r'(file = "(efficiencies|angles|stretch|preload).csv")', rf"\1, {left_out}", text)
+        (folder / "cable.toml").write_text(text)
+        shown |= dict(collect_figure_data(bf.fit(folder, mcmc=False), ("efficiency", "wrap_angles", "stretch", "preload")))
+    assert_readable(shown, "cable")
+    for name, data in shown.items():
+        figure, words = FIGURES[name].draw(data), FIGURES[name].caption(data)
+        entries = [entry for axes in figure.axes for entry in axes.get_legend_handles_labels()[1]]
+        assert LEFT_OUT in entries and "1 reading left out by the user" in words, name
+    (chart,) = make_efficiency_chart(shown["efficiency"])
+    assert [series.color for group in chart.groups for series in group.series if series.label == LEFT_OUT] == ["gray"]

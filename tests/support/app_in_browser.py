@@ -34,6 +34,22 @@ def faults_of(page):
     return faults + page.evaluate(_SHELL_WORDS)
 
 
+_SERIOUS = """async () => (await axe.run(document, { resultTypes: ["violations"] })).violations
+  .filter(fault => ["serious", "critical"].includes(fault.impact) || fault.id.includes("main"))
+  .map(fault => `${fault.impact}, ${fault.id}: ${fault.nodes.map(node => node.html.slice(0, 120)).join(" | ")}`)"""
+
+
+def serious_findings(page, axe):
+    """What axe-core finds serious or critical on a page.
+
+    Args:
+        page: The page.
+        axe: Script of axe-core.
+    """
+    page.evaluate(axe)
+    return page.evaluate(_SERIOUS)
+
+
 class Served:
     """An app that runs.
 

@@ -1,17 +1,17 @@
-"""Pages on which measurements are brought: the start, and the files of a new data set."""
+"""The page on which measurements are brought: files on their way to a data set, what they say, and what is asked."""
 
 import shlex
 from collections.abc import Awaitable, Callable
 from functools import partial
-from pathlib import Path
 from typing import TypeAlias
 
 from nicegui import ui
-from nicegui.element import Element
 
+from bowdenfit.addons.app.curve_menu import is_of_curves, show_curve_menu
 from bowdenfit.addons.app.data_charts import sketch_file
 from bowdenfit.addons.app.draft import Draft, Refusal, Understanding
 from bowdenfit.addons.app.elements import (
+    BENCH,
     address,
     block,
     button,
@@ -24,24 +24,21 @@ from bowdenfit.addons.app.elements import (
     text_input,
 )
 from bowdenfit.addons.app.equivalent_command import EquivalentCommand
-from bowdenfit.addons.app.frame import NAME, attempt, frame, notify, refused, section
-from bowdenfit.addons.app.history import read_past_fit, show_past_fit
-from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
+from bowdenfit.addons.app.frame import attempt, frame, notify, refused, section
+from bowdenfit.addons.app.measured_view import MeasuredView, show_checked, sort_warnings
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.sheet import FILE as TYPED
 from bowdenfit.addons.app.sheet import TypedSheet
-from bowdenfit.addons.app.workbench import KeptFit, Workbench, refuse_folder_name, refuse_module_name
+from bowdenfit.addons.app.workbench import Workbench, refuse_folder_name, refuse_module_name
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
 from bowdenfit.kinds.lone_file import FileColumn
 from bowdenfit.pages.page import render_section
 from bowdenfit.pages.section import prose_section
-from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
 from bowdenfit.questions.start.measured_file import MeasuredFile
 from bowdenfit.units import usual_units
 from bowdenfit.words import counted, listed, shown
 
-_BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
 _BENCH_WORDS = (
     "A run is one mounting of the cable: removing and remounting it starts a new run. The stroke is pull while the motor "
     "pulls, and return while the load pulls back."
@@ -49,105 +46,6 @@ _BENCH_WORDS = (
 Again: TypeAlias = Callable[[], Awaitable[None]]
 _DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
 _HEADS = ("column", "unit", "read as", "first", "last", "lowest", "highest")
-
-
-def show_start(workbench: Workbench) -> None:
-    """Show what lies in the folder, and what can be brought."""
-    with frame(NAME):
-        text(f"Friction of a Bowden cable from what was measured on its bench. Everything stays in {workbench.folder}.")
-        with section("Add measurements", "bring"), block("div", "beginning"):
-            with block("ul", "ways"):
-                _show_ways(workbench)
-            with block("figure", "bench-figure"):
-                markup(_BENCH, "div")
-                text("What is measured: the force at both ends of the cable, and how far it is bent.", "figcaption")
-        _show_data_sets(workbench)
-        _show_fits(workbench)
-
-
-def _show_ways(workbench: Workbench) -> None:
-    """Show how a data set begins: with files or a typed table, with an example, or with a folder that has a cable.toml."""
-    with block("li"):
-        text("Measured files, or a table to type", "h3")
-        text("Tables, workbooks and recordings as your bench wrote them; what they do not say is asked.")
-        with block("div", "row"):
-            button("New data set", lambda: ui.navigate.to(address("new", workbench.new_draft().key)), "primary")
-    with block("li"):
-        text("An example", "h3")
-        _show_examples(workbench)
-    with block("li"):
-        text("A folder that has a cable.toml", "h3")
-        text(f"Copy it into {workbench.folder}, and load this page again.")
-
-
-def _show_examples(workbench: Workbench) -> None:
-    """Show the examples that can be copied into the folder."""
-    examples = [name for name, path in find_examples().items() if find_verb(path) == "fit"]
-    if not examples:
-        return
-    chosen = {"name": examples[0]}
-
-    async def take() -> None:
-        if await attempt(lambda: write_example(chosen["name"], workbench.folder / chosen["name"])):
-            ui.navigate.to(address("data", chosen["name"]))
-
-    with block("div", "row"):
-        with field("Copied into the folder", "example"):
-            choice("example", examples[0], [(name, name) for name in examples], lambda name: chosen.update(name=name))
-        button("Copy the example", take)
-
-
-def _show_data_sets(workbench: Workbench) -> None:
-    """Show the data sets of the folder."""
-    names = workbench.data_sets()
-    if unnamed := workbench.unnamed_data_sets():
-        text(f"{counted(unnamed, 'data set')} cannot be opened here: rename the folder, in letters that print.", classes="hint")
-    if not names:
-        return
-    with section("Data sets", "data-sets"), block("ul", "cards"):
-        for name in names:
-            with block("li"):
-                text(workbench.title_of(name), "h3", dir="auto")
-                with block("div", "row"):
-                    link("Look at it and fit it", address("data", name), "button")
-
-
-def _show_fits(workbench: Workbench) -> None:
-    """Show the fits of the folder, those that run or were interrupted too."""
-    fits = workbench.fits()
-    running = [name for name, job in workbench.jobs.items() if job.running]
-    if not (fits or running):
-        return
-    with section("Fits", "fits"):
-        if sum(fit.finished for fit in fits) > 1:
-            link("Compare two fits", "/compare")
-        _show_fit_cards(workbench, fits, running)
-
-
-def _show_fit_cards(workbench: Workbench, fits: list[KeptFit], running: list[str]) -> None:
-    """Show a card for each fit."""
-    places: dict[str, Element] = {}
-
-    async def fill() -> None:
-        for name, place in places.items():
-            past = await workbench.compute(read_past_fit, workbench, name)
-            with place:
-                show_past_fit(past)
-
-    ui.timer(0.05, fill, once=True)
-    with block("ul", "cards"):
-        for name in dict.fromkeys([*running, *(fit.name for fit in fits)]):
-            finished = any(fit.name == name and fit.finished for fit in fits)
-            with block("li"):
-                text(name, "h3", dir="auto")
-                if name in running:
-                    text("Being fitted now.", classes="state doubtful")
-                elif not finished:
-                    text("Interrupted; it can be resumed.", classes="state doubtful")
-                else:
-                    places[name] = block("div")
-                with block("div", "row"):
-                    link("See the answer" if finished and name not in running else "Open", address("fit", name), "button")
 
 
 async def show_draft(workbench: Workbench, draft: Draft) -> None:
@@ -213,7 +111,7 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     with section("What was read", "read"):
         _show_refusals(understanding.refusals)
         _show_files(draft, understanding, look_again)
-    _show_questions(draft, understanding, look_again)
+    _show_questions(workbench, draft, understanding, look_again)
     if not understanding.description:
         return
     with section("What it means", "understood"):
@@ -226,7 +124,8 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     if understanding.checked is not None:
         _show_writing(workbench, draft)
     with place:
-        await MeasuredView(workbench, draft.folder).show(understanding.refusals)
+        warnings = sort_warnings(understanding.checked) if understanding.checked is not None else {}
+        await MeasuredView(workbench, draft.folder).show(understanding.refusals, warnings)
 
 
 def _show_steps(understanding: Understanding) -> None:
@@ -349,7 +248,7 @@ def _show_refused_rows(file: str, refusals: list[Refusal]) -> None:
                         text(page_words(refusal.sentence), "p", "fault")
 
 
-def _show_questions(draft: Draft, understanding: Understanding, look_again: Again) -> None:
+def _show_questions(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
     """Show what the files do not say."""
     if not understanding.entries:
         return
@@ -360,13 +259,17 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
 
     with section("What the files do not state", "questions"), block("div", "questions"):
         with block("figure", "bench-figure"):
-            markup(_BENCH, "div")
+            markup(BENCH, "div")
             text(_BENCH_WORDS, "figcaption")
         for number, entry in enumerate(understanding.entries):
             key = f"question-{number}"
             hint = "" if entry.key in draft.answers and not entry.fault else entry.hint
-            with field(entry.words, key, hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
-                if entry.options:
+            has_pictures = is_of_curves([option for option, _ in entry.options])
+            words = f"{entry.words.partition(':')[0]}?" if has_pictures else entry.words  # the menu says what each option is
+            with field(words, key, hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
+                if has_pictures:
+                    show_curve_menu(workbench, key, entry.answer, entry.options, partial(answer, entry.key), words)
+                elif entry.options:
                     options = entry.options if entry.answer else (("", "choose one"), *entry.options)
                     choice(key, entry.answer, options, partial(answer, entry.key))
                 else:

@@ -12,7 +12,7 @@ from bowdenfit.addons.app.equivalent_command import EquivalentCommand, show_comm
 from bowdenfit.addons.app.fit_job import FitRequest
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.history import show_history
-from bowdenfit.addons.app.measured_view import MeasuredView, show_checked
+from bowdenfit.addons.app.measured_view import MeasuredView, show_checked, sort_warnings
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
 from bowdenfit.errors import BowdenfitError, UsageError
@@ -143,7 +143,8 @@ class DataSetPage:
                 show_checked(report)
             elif error is not None:
                 refused(str(error))
-            await MeasuredView(self._workbench, folder, self._change_row).show(list_refusals(error) if error else ())
+            refusals, warnings = list_refusals(error) if error else (), sort_warnings(report) if report else {}
+            await MeasuredView(self._workbench, folder, self._change_row).show(refusals, warnings)
 
     async def _change_row(self, kind: str, file: str, row: int, reason: str | None) -> None:
         """Leave a row out with a reason, or take it in again without one; and look at the data set anew.

@@ -1,5 +1,6 @@
 """The page on which a cable is described: a form for every key of its cable.toml, with the text next to it."""
 
+import re
 import tomllib
 from collections.abc import Callable
 from functools import partial
@@ -8,6 +9,7 @@ from typing import Any
 
 from nicegui import ui
 
+from bowdenfit.addons.app.curve_menu import is_of_curves, show_curve_menu
 from bowdenfit.addons.app.description_edit import read_description_text, write_description
 from bowdenfit.addons.app.description_form import (
     MENU,
@@ -45,6 +47,7 @@ class DescribePage:
         self._workbench, self._name = workbench, name
         self._text = self._saved = read_description_text(workbench.data_set(name))
         self._open: set[str] = set()
+        self._faults: list[str] = []
         title = workbench.title_of(name)
         with frame("Describe the cable", ((title, address("data", name)),)):
             text("Every key that cable.toml may have. What is left empty is left out, and then holds what is said below it.")
@@ -72,6 +75,7 @@ class DescribePage:
     def _draw_form(self) -> None:
         """Show the groups of the form; of a text that is no TOML nothing, so that nothing of it is lost."""
         self._form.clear()
+        self._faults = find_faults(self._text)
         with self._form:
             try:
                 groups = list_groups(tomllib.loads(self._text))
@@ -88,7 +92,7 @@ class DescribePage:
             text(group.title if group.is_stated else f"{group.title} (nothing stated)", "summary", dir="auto")
             for entry in group.fields:
                 self._show_field(entry)
-        if is_first or group.title in self._open:
+        if is_first or group.title in self._open or any(self._find_fault(entry) for entry in group.fields):
             part.props["open"] = True
         part.on("toggle", partial(self._note_open, group.title), js_handler="event => emit(event.target.open)")
 
@@ -98,14 +102,22 @@ class DescribePage:
     def _show_field(self, entry: FormField) -> None:
         """Show one key."""
         label = f"{entry.label} (needed)" if entry.needed else entry.label
-        with field(label, entry.key, entry.hint):
+        with field(label, entry.key, entry.hint, self._find_fault(entry)):
             options = entry.options if entry.kind == MENU else ("true", "false") if entry.kind == YES_NO else ()
             if options:
                 unknown = () if entry.value in ("", *options) else (entry.value,)
                 choices = [("", "left out"), *((option, option) for option in (*options, *unknown))]
-                choice(entry.key, entry.value, choices, self._setter(entry))
+                if is_of_curves(options):
+                    show_curve_menu(self._workbench, entry.key, entry.value, choices, self._setter(entry), label)
+                else:
+                    choice(entry.key, entry.value, choices, self._setter(entry))
             else:
                 text_input(entry.key, entry.value, self._setter(entry))
+
+    def _find_fault(self, entry: FormField) -> str:
+        """Return why a key is refused as it is; empty where it is not."""
+        path = re.compile(rf"(?<![\w.]){re.escape('.'.join(map(str, entry.path)))}(?!\w)")
+        return next((fault for fault in self._faults if path.search(fault)), "")
 
     def _setter(self, entry: FormField) -> Callable[[str], Any]:
         async def change(typed: str) -> None:
@@ -160,8 +172,8 @@ class DescribePage:
         """Show whether the description can be read."""
         self._status.clear()
         with self._status:
-            if fault := find_fault(self._text):
-                refused(fault)
+            if faults := find_faults(self._text):
+                refused("\n".join(faults))
             else:
                 state = "It is as it was saved." if self._text == self._saved else "It can be saved."
                 text(f"Nothing is wrong with this description by itself. {state}", classes="state good")
@@ -186,12 +198,12 @@ class DescribePage:
         ui.navigate.to(address("data", self._name))
 
 
-def find_fault(description: str) -> str:
-    """Return why the text of a description is refused by itself; empty where it is not."""
+def find_faults(description: str) -> list[str]:
+    """Return why the text of a description is refused by itself, in a sentence for each fault."""
     try:
         parse_description(tomllib.loads(description))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        return f"This is no TOML: {error}. The usual cause is a missing quotation mark or bracket there."
+        return [f"This is no TOML: {error}. The usual cause is a missing quotation mark or bracket there."]
     except BowdenfitError as error:
-        return str(error)
-    return ""
+        return [str(fault) for fault in error.faults or (error,)]
+    return []

@@ -26,7 +26,6 @@ _TITLES = {
 }  # fmt: skip
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 _EXAMPLES = {
-    "exclude": '[{ rows = [7], reason = "the rope jumped" }]',
     "columns": '{ input_force = { name = "F1", unit = "N" } }',
     "prior": "{ normal = { mean = 0.1, sd = 0.05 } }",
     "measured": "{ value = 0.10, sd = 0.02 }",

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlencode
 
@@ -11,6 +12,7 @@ from nicegui.element import Element
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.words import printable, unbroken
 
+BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
 _VALUE = "event => emit(event.target.value)"
 VALUE_AT_FIRST = "^value"  # set as an attribute: the property would be set back, over what is typed, whenever the page changes
 

@@ -4,6 +4,7 @@ import json
 import subprocess
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ class FitRequest:
         resume: Whether an interrupted fit goes on.
         force: Whether an earlier fit in the folder is replaced.
         settings: Settings that differ from cable.toml, such as "friction.mu1.fixed=0.1".
+        start: Values at which the search begins too, by parameter.
     """
 
     dataset: Path
@@ -36,6 +38,7 @@ class FitRequest:
     resume: bool = False
     force: bool = False
     settings: tuple[str, ...] = ()
+    start: Mapping[str, float] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the keywords of `bowdenfit.fit`."""

@@ -86,5 +86,7 @@ class Form:
         if question.form == "yes or no":
             options = (("y", "yes"), ("n", "no"))
         hint = question.why or (f"such as {question.example}" if question.example and not options else "")
+        if question.form == "word":
+            options = tuple((option, option) for option in question.options)
         choices = () if question.form == "several" else options
         self.entries.append(FormEntry(key, page_words(question.words), typed, hint, choices, fault))

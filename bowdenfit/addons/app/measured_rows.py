@@ -10,14 +10,11 @@ from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description, Table
 from bowdenfit.description.measurements import ExcludedRows
 from bowdenfit.errors import BowdenfitError, Faults
-from bowdenfit.files.columns import Column, Quantity
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.descriptions import load_description
-from bowdenfit.kinds.rows import ENDS, shared_columns
 from bowdenfit.kinds.table_files import Source
 
 READ, LEFT_OUT, REFUSED = "read", "left out", "refused"
-_WANTED = (*ENDS, Quantity("efficiency", "ratio", optional=True))
 
 
 @dataclass(frozen=True)
@@ -105,17 +102,14 @@ def collect_rows(folder: Path, refusals: Sequence[Refusal] = ()) -> MeasuredRows
         for kind, settings in description.tables.stated.items()
         if isinstance(settings, Table)
     ]
-    files, unused = list[FileRows](), list[UnusedRow]()
+    files = list[FileRows]()
     for source in sources:
         with suppress(BowdenfitError):
-            for path in source.files:
-                file = _list_file_rows(source, path, refusals)
-                files.append(file)
-                unused += _find_unused(source, path, file)
-    dataset = None
+            files += [_list_file_rows(source, path, refusals) for path in source.files]
     with suppress(BowdenfitError):
         dataset = read_dataset(_without_refused(description, sources, refusals), folder, {})
-    return MeasuredRows(dataset, tuple(files), tuple(unused))
+        return MeasuredRows(dataset, tuple(files), tuple(_list_unused(dataset, files)))
+    return MeasuredRows(None, tuple(files))
 
 
 def _list_file_rows(source: Source, path: Path, refusals: Sequence[Refusal]) -> FileRows:
@@ -133,26 +127,14 @@ def _list_file_rows(source: Source, path: Path, refusals: Sequence[Refusal]) -> 
     return FileRows(source.kind, source.name_of(path), table.header, tuple(rows))
 
 
-def _find_unused(source: Source, path: Path, file: FileRows) -> list[UnusedRow]:
-    """Return what can be drawn of the rows of a file that are not used."""
-    unused = {row.row: row.state for row in file.rows if row.state != READ}
-    if not unused:
-        return []
-    whole = Source(source.kind, source.settings.model_copy(update={"exclude": ()}), source.description, source.folder)
-    wanted = {quantity.name: quantity for quantity in (*_WANTED, *shared_columns(source.description))}
-    _, columns = whole.read_table(path, tuple(wanted.values()), sheet=source.sheets_of(path)[0])
-    return [UnusedRow(source.kind, path.name, row, state, _read_numbers(columns, row)) for row, state in unused.items()]
-
-
-def _read_numbers(columns: dict[str, Column], row: int) -> dict[str, float]:
-    """Return the numbers in a row, of those cells that hold one."""
-    numbers = {}
-    for name, column in columns.items():
-        for cell in column.cells:
-            if cell.row == row:
-                with suppress(BowdenfitError):
-                    numbers[name] = column.value(cell)
-    return numbers
+def _list_unused(dataset: Dataset, files: Sequence[FileRows]) -> list[UnusedRow]:
+    """Return what can be drawn of the rows that are not used: those that the user leaves out, and those that are refused."""
+    states = {(file.kind, Path(file.file).name, row.row): row.state for file in files for row in file.rows}
+    return [
+        UnusedRow(kind, row.file, row.row, states.get((kind, row.file, row.row), LEFT_OUT), row.values)
+        for kind, rows in dataset.measurements.excluded.items()
+        for row in rows
+    ]
 
 
 def _without_refused(description: Description, sources: Sequence[Source], refusals: Sequence[Refusal]) -> Description:

@@ -1,8 +1,9 @@
 """What was measured, on pages of drafts and data sets: what `check` says, charts before any fit, and the rows of the files."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from nicegui import ui
@@ -11,7 +12,7 @@ from bowdenfit.addons.app.angle_charts import fit_curves
 from bowdenfit.addons.app.data_charts import make_pictures
 from bowdenfit.addons.app.description_edit import preview_exclusion
 from bowdenfit.addons.app.draft import Refusal
-from bowdenfit.addons.app.elements import block, button, field, markup, text, text_input
+from bowdenfit.addons.app.elements import block, button, field, link, markup, text, text_input
 from bowdenfit.addons.app.elements import report as report_text
 from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import attempt
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.check.data_set_words import Report
 
 ChangeRow: TypeAlias = Callable[[str, str, int, str | None], Awaitable[None]]
+Warnings: TypeAlias = Mapping[str, Sequence[str]]
 _BY_USER = "left out by the user"  # in notes that stay in sight
 _MOST_ROWS = 400  # of a file, that a page shows; a judgement
 _MOST_COLUMNS = 12  # of a row; a judgement
@@ -52,19 +54,25 @@ class MeasuredView:
         self._workbench, self._folder, self._change_row = workbench, folder, change_row
         self._measured = MeasuredRows()
 
-    async def show(self, refusals: tuple[Refusal, ...] = ()) -> None:
+    async def show(self, refusals: tuple[Refusal, ...] = (), warnings: Warnings = MappingProxyType({})) -> None:
         """Show charts and rows here; the curves of wrap angles follow once they are worked out.
 
         Args:
             refusals: Why the data set is refused.
+            warnings: Warnings about each kind of table, which are shown next to its rows.
         """
         charts, self._rows = block("div", id="charts"), block("div", id="rows")
         self._measured = await self._workbench.compute(collect_rows, self._folder, refusals)
         with charts:
             place = markup(_render_charts(self._measured, ()), "div")
         with self._rows:
-            for file in self._measured.files:
-                self._show_rows(file)
+            files = self._measured.files
+            for kind in dict.fromkeys([*warnings, *(file.kind for file in files)]):
+                with block("div", id=f"about-{kind}"):
+                    for warning in warnings.get(kind, ()):
+                        _show_warning(warning)
+                    for file in (file for file in files if file.kind == kind):
+                        self._show_rows(file)
         dataset = self._measured.dataset
         if dataset is not None and dataset.description.curved:
             try:
@@ -123,11 +131,39 @@ class MeasuredView:
         ui.run_javascript("document.getElementById('reason')?.focus()")
 
 
-def show_checked(report: "Report") -> None:
-    """Show what was understood of a data set, warnings first; all that the command line prints on request."""
+def sort_warnings(report: "Report") -> Warnings:
+    """Return the warnings about each kind of table, by its name; under an empty name those about none.
+
+    Args:
+        report: A data set that was checked.
+    """
+    tables = list(iterate_tables(report.measurements))
+    of_kinds = {kind.name: kind.warnings(table, report.description, report.measurements) for kind, table in tables}
+    files = {kind.name: getattr(getattr(table, "origin", None), "files", ()) for kind, table in tables}
+    by_kind: dict[str, list[str]] = {}
     for warning in report.warnings:
-        with block("div", "verdict doubtful"):
-            text(page_words(f"Warning: {warning}"))
+        own = [kind for kind in of_kinds if warning in of_kinds[kind]]
+        named = [kind for kind in files if any(file in warning for file in files[kind])]
+        by_kind.setdefault(next(iter([*own, *named]), ""), []).append(warning)
+    return by_kind
+
+
+def _show_warning(warning: str) -> None:
+    """Show a warning where it belongs."""
+    with block("div", "verdict doubtful"):
+        text(page_words(f"Warning: {warning}"))
+
+
+def show_checked(report: "Report") -> None:
+    """Show what was understood of a data set, and the way to each warning; all that the command line prints on request."""
+    warnings = sort_warnings(report)
+    for warning in warnings.get("", ()):
+        _show_warning(warning)
+    if located := {kind: sentences for kind, sentences in warnings.items() if kind}:
+        with block("ul", "links"):
+            for kind, sentences in located.items():
+                with block("li"):
+                    link(f"{counted(len(sentences), 'warning')} about the table of {kind}", f"#about-{kind}")
     text(f"Everything could be read. {'' if report.warnings else 'Nothing is wrong.'}", classes="state good")
     tables = iterate_tables(report.measurements)
     described = [(kind.heading, kind.describe(table, report.description)) for kind, table in tables]

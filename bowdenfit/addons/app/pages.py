@@ -9,13 +9,14 @@ from nicegui import ui
 
 from bowdenfit.addons.app.add_rows import AddRowsPage
 from bowdenfit.addons.app.ask import export_file
-from bowdenfit.addons.app.bring import show_draft, show_start
+from bowdenfit.addons.app.bring import show_draft
 from bowdenfit.addons.app.data_set import DataSetPage
 from bowdenfit.addons.app.describe import DescribePage
 from bowdenfit.addons.app.frame import frame, refused, style_and_script
 from bowdenfit.addons.app.live import LivePage
 from bowdenfit.addons.app.see import FitPage
 from bowdenfit.addons.app.side_by_side import TwoFitsPage
+from bowdenfit.addons.app.start_page import show_start
 from bowdenfit.addons.app.try_page import TryPage
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError

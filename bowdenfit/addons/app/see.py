@@ -170,9 +170,9 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         printed = await workbench.compute(_read_summary, folder)
         contents = block("div", id="contents")
         past = await workbench.compute(read_past_fit, workbench, name)
-        if past.change:
+        if change := past.changes.describe():
             with block("div", "verdict doubtful", role="status"):
-                text(past.change)
+                text(change)
         with block("div", "columns-of-page"):
             with block("div") as left, section("The answer", "answer"):
                 answer = _show_text(printed)
@@ -264,7 +264,7 @@ def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str)
 
 def _show_text(printed: Reply) -> Any:
     """Show a summary as it was written, and return where it is."""
-    words = Preformatted(page_words(printed.text)).to_html()
+    words = Preformatted(page_words(printed.text)).to_html().replace("<pre>", '<pre tabindex="0">')  # which scrolls
     return markup(words, "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
 
 

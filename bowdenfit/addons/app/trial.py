@@ -160,6 +160,11 @@ class TrialModel:
                 points.append(Points("By the model", "vermillion", "hollow", x[rows], expected[rows]))
         return make_chart(words, label, f"{words} ({unit})", points, lines)
 
+    def list_start(self, trial: Trial) -> dict[str, float]:
+        """Return the values at which a fit can begin: all that are tried but the sizes of the noise, which its search holds."""
+        names = (parameter.name for parameter in self._model.space.free if parameter.role != "noise")
+        return {name: float(f"{trial.values[name]:.6g}") for name in names}
+
     def hold(self, name: str, value: float) -> str:
         """Return the setting of cable.toml that holds a parameter at a value, as `--set` takes it.
 

@@ -19,7 +19,7 @@ from bowdenfit.run.verb import VERB as FIT
 from bowdenfit.words import significant
 
 if TYPE_CHECKING:
-    from bowdenfit.addons.app.trial import Slider, TrialModel
+    from bowdenfit.addons.app.trial import Slider, Trial, TrialModel
     from bowdenfit.finished_fit import Fit
 
 _THROTTLE = 0.1  # s between two positions of a slider that is moved; a judgement
@@ -43,7 +43,7 @@ class TryPage:
         if fit_name:
             workbench.results(fit_name)
         self._z: dict[str, float] = {}
-        self._values: dict[str, float] = {}
+        self._trial: Trial | None = None
         self._outputs: dict[str, tuple[Any, Slider]] = {}
         self._newest, self._busy = 0, False
         above = [(workbench.title_of(name), address("data", name))]
@@ -72,7 +72,7 @@ class TryPage:
                 with block("div"), section("Against the data", "tried"):
                     self._misfit = block("p", "misfit", role="status", id="misfit")
                     self._charts = markup("", "div", id="trial-charts")
-            self._show_holding()
+            self._show_fitting()
             if fit is not None:
                 LikelihoodView(self._workbench, fit).show()
         await self._answer()
@@ -114,7 +114,7 @@ class TryPage:
             while answered != self._newest:
                 answered = self._newest
                 trial = await self._workbench.compute(self._model.ask, dict(self._z))
-                self._values = dict(trial.values)
+                self._trial = trial
                 for name, (output, slider) in self._outputs.items():
                     unit = "" if slider.unit == "1" else f" {slider.unit}"
                     output.set_content(f"{significant(trial.values[name])}{unit}")
@@ -122,13 +122,13 @@ class TryPage:
                 with self._misfit:
                     text(trial.misfit, "span")
                 self._charts.set_content(_render_charts("trial", self._model.draw(trial)))
-                self._show_held()
+                self._show_commands()
                 await asyncio.sleep(0)
         finally:
             self._busy = False
 
-    def _show_holding(self) -> None:
-        """Show how the data set is fitted with a value held."""
+    def _show_fitting(self) -> None:
+        """Show how the data set is fitted from the values that are tried, or with one of them held."""
         names = [slider.name for slider in self._model.sliders if slider.is_coefficient]
         if not names:
             return
@@ -136,32 +136,60 @@ class TryPage:
 
         def hold(name: str) -> None:
             self._held = name
-            self._show_held()
+            self._show_commands()
 
-        def start() -> None:
-            request = self._request
-            if running := self._workbench.running_fit(self._name):
-                raise UsageError(f"the fit {running} of this data set runs already; wait for it, or cancel it.")
-            self._workbench.start_fit(request)
-            ui.navigate.to(address("fit", request.output.name))
-
+        place = f"In {self._workbench.folder}:"
+        with section("Fit from here", "start"):
+            text("The search for the best fit begins at these values too, besides its own starts; the best of all is kept.")
+            button("Start the fit from here", lambda: attempt(lambda: self._start(self._started)), "primary")
+            self._start_command = EquivalentCommand([""], place, key="start-command")
         with section("Fit with a value held", "held"):
-            text("A fit finds its own start, so none is taken from here. It can hold one coefficient where you put it:")
+            text("One coefficient stays where you put it, and all others are fitted:")
             with block("div", "row"):
                 with field("Coefficient that is held", "held-name"):
                     choice("held-name", self._held, [(name, name) for name in names], hold)
-                button("Fit with it held", lambda: attempt(start))
-            self._command = EquivalentCommand([""], f"In {self._workbench.folder}:", key="held-command")
+                button("Fit with it held", lambda: attempt(lambda: self._start(self._holding)))
+            self._command = EquivalentCommand([""], place, key="held-command")
+
+    def _start(self, request: FitRequest) -> None:
+        """Start a fit.
+
+        Raises:
+            UsageError: The data set is being fitted already.
+        """
+        if running := self._workbench.running_fit(self._name):
+            raise UsageError(f"the fit {running} of this data set runs already; wait for it, or cancel it.")
+        self._workbench.start_fit(request)
+        ui.navigate.to(address("fit", request.output.name))
+
+    def _request(self, **changes: Any) -> FitRequest:
+        return self._workbench.request_fit(self._workbench.free_name(self._name), self._name, **changes)
 
     @property
-    def _request(self) -> FitRequest:
-        """The fit with a coefficient held."""
-        settings = (self._model.hold(self._held, self._values[self._held]),)
-        return self._workbench.request_fit(self._workbench.free_name(self._name), self._name, settings=settings)
+    def _started(self) -> FitRequest:
+        """The fit from the values that are tried."""
+        return self._request(start=self._model.list_start(self._tried))
 
-    def _show_held(self) -> None:
+    @property
+    def _holding(self) -> FitRequest:
+        """The fit with a coefficient held."""
+        return self._request(settings=(self._model.hold(self._held, self._tried.values[self._held]),))
+
+    @property
+    def _tried(self) -> "Trial":
+        """What the model says where the sliders stand.
+
+        Raises:
+            UsageError: It has not answered yet.
+        """
+        if self._trial is None:
+            raise UsageError("the model is still being compiled; try again in a moment.")
+        return self._trial
+
+    def _show_commands(self) -> None:
         if hasattr(self, "_command"):
-            self._command.show(write_command(FIT, vars(self._request), self._workbench.folder))
+            for command, request in ((self._start_command, self._started), (self._command, self._holding)):
+                command.show(write_command(FIT, vars(request), self._workbench.folder))
 
 
 class LikelihoodView:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +18,7 @@ from bowdenfit.addons.app.draft import Draft, is_module_name, is_reserved
 from bowdenfit.addons.app.fit_job import FitJob, FitRequest
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError, disk_error
-from bowdenfit.inputs import refuse_special
+from bowdenfit.inputs import sha256_of
 from bowdenfit.outputs import refuse_link
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figure_data, warning_mark, write_figure_files
@@ -278,9 +277,8 @@ def file_checksum(path: Path) -> str:
         path: The file.
     """
     try:
-        refuse_special(path)
         status = path.stat()
-        return _digest(path, status.st_mtime_ns, status.st_size)
+        return sha256_of(path) if path.is_dir() else _digest(path, status.st_mtime_ns, status.st_size)
     except (OSError, BowdenfitError):
         return ""
 
@@ -288,8 +286,7 @@ def file_checksum(path: Path) -> str:
 @lru_cache(1000)
 def _digest(path: Path, _: int, __: int) -> str:
     """Checksum of a file that is as it was at a time, with a size."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return sha256_of(path)
 
 
 def _collect_figure_data(fit: Fit) -> dict[str, Any]:

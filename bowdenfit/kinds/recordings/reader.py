@@ -4,12 +4,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
+from bowdenfit.description.measurements import ExcludedSpan
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
 from bowdenfit.files.cells import AS_DECIMALS
@@ -30,11 +31,14 @@ from bowdenfit.recordings.preparation import (
     inspect_recording,
 )
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, RANGE
+from bowdenfit.recordings.preparation.excluded import leave_out_spans
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 from bowdenfit.recordings.two_loggers import ClockShift, align_clocks, check_determined
 from bowdenfit.types import Vector
 from bowdenfit.units import INTERNAL_UNITS, ChannelSource, ColumnSource, speed_dimension
+
+_MOST_SPANS = 1000  # that are left out; a judgement
 
 
 class RecordingsTable(TableSettings):
@@ -49,6 +53,15 @@ class RecordingsTable(TableSettings):
     channels: dict[str, ChannelSource] = Field(default_factory=dict)
     likelihood: Literal["runs", "whole"] = "runs"
     prepare: Preparation = Preparation()
+    exclude: Annotated[tuple[ExcludedSpan, ...], Field(max_length=_MOST_SPANS)] = ()
+
+    def list_excluded(self) -> list[tuple[tuple[str, str], int, str]]:
+        """Return the stretches that are left out, such as "470mm.csv, 3 to 4.5 s (the rope jumped)"."""
+        file, words = self.files if isinstance(self.files, str) else "the recording", ("stretch", "stretches")
+        return [
+            (words, 1, f"{part.file or file}, {part.start:g} to {part.end:g} s ({part.reason})")
+            for part in self.exclude
+        ]
 
     @property
     def fits_offsets(self) -> bool:
@@ -76,7 +89,8 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     entries = _list_entries(source)
     _check_names(entries)
     faults = Faults()
-    read = faults.read_all(lambda entry: _read_file(source, *entry), entries, None)
+    files_of_all = [path for path, _ in entries]
+    read = faults.read_all(lambda entry: _read_file(source, *entry, files_of_all), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -224,7 +238,7 @@ def _recording_name(path: Path, entry: RecordingFile) -> str:
     return entry.name or entry.run or (f"{path.stem}, {entry.sheet}" if entry.sheet else path.stem)
 
 
-def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
+def _read_file(source: Source, path: Path, entry: RecordingFile, files_of_all: Sequence[Path]) -> _File:
     description = source.description
     table = description.table(RecordingsTable)
     assert table is not None  # the caller asked
@@ -259,6 +273,7 @@ def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
     shift = None
     if output_rows:
         raw, shift, page = align_clocks(raw, entry.clock_shift, page)
+    raw = leave_out_spans(raw, [(part.start, part.end) for part in source.find_excluded(path, files_of_all)])
     stated = [value for value in (entry.clock_shift, page.delay) if isinstance(value, QuantityValue)]
     stated_sd = max((value.sd_to("time") or 0.0 for value in stated), default=0.0)
     if entry.velocity is not None and not unit:

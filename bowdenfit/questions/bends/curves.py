@@ -4,6 +4,7 @@ Quantiles have the 5 %, 50 % and 95 % quantiles of the draws as first axis; one 
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -60,13 +61,14 @@ def collect_stretch(fit: Record) -> tuple[StretchCurve, ...] | None:
         return {way: elastic.stretch(values, load, angle, highest) for way, highest in stretched.items()}
 
     both = {way: quantiles_of_draws(draws) for way, draws in evaluate_curves(fit, curves).items()}
-    curves_by_angle = []
+    curves_by_angle, left_out = [], fit.dataset.measurements.excluded_points("stretch", "load", "stretch")
     for i, angle in enumerate(angles):
         mask = table.wrap_angle == angle
         down = table.unloading[mask]
         back = both["unloading"][:, i] if down.any() else None
         points = table.load[mask], table.stretch[mask], down
         curves_by_angle.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
+    curves_by_angle[0] = replace(curves_by_angle[0], left_out=left_out)
     return tuple(curves_by_angle)
 
 
@@ -88,7 +90,9 @@ def collect_preload(fit: Record) -> PreloadCurve | None:
         quantiles_of_draws(draws["preload"]),
         quantiles_of_draws(draws["slack"]),
         probability,
-        *points,
+        points[0],
+        points[1],
+        fit.dataset.measurements.excluded_points("preload", "wrap_angle", "preload") * [[180 / np.pi], [1]],
     )
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import describe_curve, describe_strip
+from bowdenfit.plots.captions import describe_curve, describe_left_out, describe_strip
 from bowdenfit.plots.curves import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import legend_above, panels
-from bowdenfit.plots.panels import span
+from bowdenfit.plots.panels import draw_left_out, span
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
 from bowdenfit.questions import bends as room
@@ -36,6 +36,7 @@ class PreloadCurve:
         slack: Quantiles of the slack [mm].
         slack_probability: Share of the draws that are slack.
         points_wrap_angle, points_preload: Readings [deg, N].
+        left_out: Wrap angle and preload of the readings that the user leaves out [deg, N].
     """
 
     wrap_angle: np.ndarray
@@ -44,6 +45,7 @@ class PreloadCurve:
     slack_probability: np.ndarray
     points_wrap_angle: np.ndarray
     points_preload: np.ndarray
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 def data(fit: Record) -> PreloadCurve | None:
@@ -58,6 +60,7 @@ def caption(curve: PreloadCurve) -> str:
         "Tension of the rope between fixed ends, which bending changes because it lengthens the sheath.",
         describe_curve(len(curve.preload) > 1),
         "Gray: where the rope is slack." if np.max(curve.slack) > 0 else "",
+        describe_left_out(curve.left_out),
         describe_strip("in N") if n else "",
         f"n = {counted(n, 'reading')}." if n else "Preload was read at no bend; the curve follows from the other tables.",
     )))  # fmt: skip
@@ -81,6 +84,7 @@ def draw(curve: PreloadCurve, width: float | None = None) -> Figure:
         _shade_slack(axes, curve)
     flat[-1].set_xlabel(WRAP_ANGLE)
     flat[-1].set_xlim(*span([curve.wrap_angle, curve.points_wrap_angle], room=0.02))
+    draw_left_out(flat[0], curve.left_out)
     legend_above(figure, flat, columns=2)
     return figure
 

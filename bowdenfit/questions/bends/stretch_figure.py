@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_left_out, describe_strip
 from bowdenfit.plots.curves import choose_evenly, draw_quantiles, middle, name_band, note_shown_count
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import span
+from bowdenfit.plots.panels import draw_left_out, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, in_paper_style, mapped_color
 from bowdenfit.questions import bends as room
@@ -40,6 +40,7 @@ class StretchCurve:
         unloading: Quantiles while it comes down from the largest load [mm]; None if no row was read so.
         points_load, points_stretch: Readings [N, mm].
         points_unloading: Whether each was read while the load came down.
+        left_out: Load and stretch of the readings that the user leaves out, of all wrap angles, on the first curve [N, mm].
     """
 
     wrap_angle: float
@@ -49,6 +50,7 @@ class StretchCurve:
     points_load: np.ndarray
     points_stretch: np.ndarray
     points_unloading: np.ndarray
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 def data(fit: Record) -> tuple[StretchCurve, ...] | None:
@@ -64,6 +66,7 @@ def caption(stretch: tuple[StretchCurve, ...]) -> str:
         f"Stretch of the rope against its load, at {count_shown(shown, len(stretch), 'wrap angle')}, a color each.",
         describe_curve(len(stretch[0].loading) > 1),
         "Open marks and dashed lines: read while the load came down." if down else "",
+        describe_left_out(stretch[0].left_out),
         describe_strip("in mm"),
         f"n = {counted(n, 'reading')}.",
     )))  # fmt: skip
@@ -83,6 +86,7 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
     for i, curve in enumerate(shown):
         _draw_curve(axes, curve, _color(i, len(shown)), MARKERS[i])
         _draw_marks(strip, curve, _residuals(curve), _color(i, len(shown)), MARKERS[i])
+    draw_left_out(axes, stretch[0].left_out)
     made.finish_strips()
     made.label("Load (N)", "Stretch (mm)", "mm")
     note_shown_count(axes, len(shown), len(every))

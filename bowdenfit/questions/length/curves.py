@@ -88,6 +88,7 @@ def _collect_angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
         table.route[~inside & detected],
         np.rad2deg(angle[~inside & detected]),
         _compute_family_alone(fit, column, band.route),
+        fit.dataset.measurements.excluded_points("angles", route.variable, column) * [[1], [180 / np.pi]],
     )
 
 

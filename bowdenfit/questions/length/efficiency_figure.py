@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import describe_strip
+from bowdenfit.plots.captions import describe_left_out, describe_strip
 from bowdenfit.plots.curves import GRID_POINTS, NEW_RUN, Band, density, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import TITLE, legend_above, panels, wrap_words
+from bowdenfit.plots.panels import draw_left_out
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
     BLACK,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
-from bowdenfit.plots.style import LEAST_SQUARES, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
+from bowdenfit.plots.style import LEAST_SQUARES, LEFT_OUT, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
 
 HEADING = "Efficiency along the route"
 # marker, its size [pt] and label
@@ -77,6 +78,7 @@ class EfficiencyAlongRoute:
         at_input_force: Input force at which the curve holds [N]; None where it is the same at any.
         new_run: Ends of the interval that holds the efficiency of a run on a new mounting with 90 % probability, along the
             curve; None where no points are runs.
+        left_out: Route and efficiency [1] of the readings that the user leaves out.
     """
 
     route_label: str
@@ -87,6 +89,7 @@ class EfficiencyAlongRoute:
     optimal_length: np.ndarray | None = None
     at_input_force: float | None = None
     new_run: np.ndarray | None = None
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 def data(fit: Record) -> EfficiencyAlongRoute | None:
@@ -99,8 +102,9 @@ def data(fit: Record) -> EfficiencyAlongRoute | None:
     friction = fit.model.cable.friction
     force = friction.conditions.reference_force if friction.depends_on_load else None
     points = length.collect_efficiency_points(fit)
+    left_out = fit.dataset.measurements.excluded_points("efficiencies", route.variable, "efficiency")
     shown = EfficiencyAlongRoute(
-        route.label, route.range, length.compute_curves(fit)["efficiency"], points, at_input_force=force
+        route.label, route.range, length.compute_curves(fit)["efficiency"], points, at_input_force=force, left_out=left_out
     )
     if posterior is None:
         return shown
@@ -116,6 +120,7 @@ def caption(data: EfficiencyAlongRoute) -> str:
     return " ".join(filter(None, (
         _describe_curve(data),
         _describe_circles(n),
+        describe_left_out(data.left_out),
         describe_strip("in percent of the input force") if n else "",
         "Panels below: probability density of the best length"
         + (", and probability of each length on offer to be the best." if best.choices else ".") if best else "",
@@ -127,7 +132,8 @@ def describe_efficiency_chart(data: EfficiencyAlongRoute) -> str:
     """Describe the chart of the report, which has no panels."""
     n, best = sum(len(points.labels) for points in data.points), data.optimum
     line = f"Orange line: best {best.what}." if best else ""
-    return " ".join(filter(None, (_describe_curve(data), _describe_circles(n), line, _describe_window(data))))
+    circles = _describe_circles(n), describe_left_out(data.left_out)
+    return " ".join(filter(None, (_describe_curve(data), *circles, line, _describe_window(data))))
 
 
 def _describe_curve(data: EfficiencyAlongRoute) -> str:
@@ -182,6 +188,7 @@ def draw(data: EfficiencyAlongRoute, width: float | None = None) -> Figure:
             _draw_choices(flat[2 + has_points], data.optimum, float(np.ptp(data.route_range)))
     for axes in flat:
         shade_outside(axes, data.route_range, x_limits)
+    draw_left_out(flat[0], data.left_out * [[1], [100]])
     flat[-1].set_xlabel(data.route_label)
     legend_above(figure, flat[:1], columns=3)
     return figure
@@ -303,7 +310,7 @@ def make_efficiency_chart(data: EfficiencyAlongRoute) -> tuple[Chart]:
         data: Data of the figure.
     """
     points = [_points_group(table) for table in data.points if np.isfinite(table.route).any()]
-    groups = (*_new_run_group(data), _curve_group(data.efficiency), *points)
+    groups = (*_new_run_group(data), _curve_group(data.efficiency), *points, *_left_out_group(data.left_out))
     force = "" if data.at_input_force is None else f", curve at {data.at_input_force:g} N"
     return (Chart("Efficiency", data.route_label, EFFICIENCY + force, groups, _optimum_spans(data)),)
 
@@ -349,6 +356,12 @@ def _points_group(points: EfficiencyPoints) -> SeriesGroup:
             series += [Series(label, "from", "blue", rows[0]), Series(label, "to", "blue", rows[-1])]
         series.append(Series("Predicted there", "hollow", "blue", rows[len(rows) // 2]))
     return SeriesGroup(route, tuple(series))
+
+
+def _left_out_group(points: np.ndarray) -> tuple[SeriesGroup, ...]:
+    """Return the readings that the user leaves out."""
+    route, efficiency = points[:, np.argsort(points[0], kind="stable")]
+    return (SeriesGroup(_separate(route), (Series(LEFT_OUT, "hollow", "gray", 100 * efficiency),)),) if len(route) else ()
 
 
 def _separate(route: np.ndarray) -> np.ndarray:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import describe_strip
+from bowdenfit.plots.captions import describe_left_out, describe_strip
 from bowdenfit.plots.curves import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import legend_above
+from bowdenfit.plots.panels import draw_left_out
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, SERIES_LINES, VERMILLION, WRAP_ANGLE, in_paper_style
 from bowdenfit.questions import length
@@ -35,6 +36,7 @@ class AngleCurve:
         undetected_route, limit: Readings below the detection limit inside the range.
         outside_route, outside_angle: Readings outside the range, which the curve does not use.
         family_alone: The family's curve without its departure, where the band has its points; empty where it does not depart.
+        left_out: Route and wrap angle of the readings that the user leaves out.
     """
 
     contact: str
@@ -46,6 +48,7 @@ class AngleCurve:
     outside_route: np.ndarray
     outside_angle: np.ndarray
     family_alone: np.ndarray
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ def caption(data: WrapAngles) -> str:
         if any(len(c.family_alone) for c in data.curves) else "",
         "Hatched: too small to be read, so anything between zero and the triangle." if limits else "",
         "Squares: outside the range of the curve, which does not use them." if unused else "",
+        describe_left_out(np.concatenate([c.left_out for c in data.curves], axis=1)),
         describe_strip("in degrees"),
         f"n = {counted(n_read, 'reading')}" + (f" and {counted(limits, 'upper limit')}." if limits else "."),
     )))  # fmt: skip
@@ -97,6 +101,7 @@ def draw(data: WrapAngles, width: float | None = None) -> Figure:
         shade_outside(strip, data.route_range, shown)
         _draw_undetected(axes, curve, data.route_range, _find_spacing(everywhere, shown))
         shade_outside(axes, data.route_range, shown)
+        draw_left_out(axes, curve.left_out)
         axes.locator_params(axis="y", nbins=7)
     panels.finish_strips()
     panels.label(data.route_label, WRAP_ANGLE, "deg")

@@ -17,6 +17,7 @@ from bowdenfit.plots.style import (
     GRAY,
     GREEN,
     LEAST_SQUARES,
+    LEFT_OUT,
     ORANGE,
     PURPLE,
     VERMILLION,
@@ -46,7 +47,11 @@ FORCE, TIME = "Force (N)", "Time from the start (s)"
 # stroke, name and fill, which differ in lightness too
 PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switching or held", "#D4D4D4"))
 LOOP_PHASES = ("Moving forward", "Moving back", "Between")
-FLAGS = {"dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY)}
+BY_USER = "by the user"  # see `clock.KINDS`
+FLAGS = {
+    "dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY),
+    BY_USER: ("o", GRAY),
+}  # fmt: skip
 OTHER_FLAG = ("+", GREEN)
 MOST_CHARTS = 24  # recordings on a page
 _CHART_POINTS = 6000  # points of all charts together
@@ -239,7 +244,8 @@ def _mark_left_out(axes: Axes, recording: OverTime) -> None:
         mask = kinds == kind
         x = np.tile(recording.flagged_time[mask] - start, 2)
         y = np.concatenate([recording.flagged_input[mask], recording.flagged_output[mask]])
-        draw_marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), f"Left out: {kind}")
+        label, fill = (LEFT_OUT, "white") if kind == BY_USER else (f"Left out: {kind}", None)
+        draw_marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), label, fill)
     at = recording.saturated.astype(bool)
     if at.any():
         on_edge = np.full(int(at.sum()), np.nan)
@@ -305,10 +311,11 @@ def _series(recording: OverTime, broken: Callable[[np.ndarray], np.ndarray]) -> 
 
 
 def _left_out_group(recording: OverTime) -> Iterator[SeriesGroup]:
-    """Yield the output force of samples that were left out, where they have one."""
-    finite = np.flatnonzero(np.isfinite(recording.flagged_output))
-    if not len(finite):
-        return
-    chosen = np.array(choose_evenly(finite.tolist(), _MAX_LEFT_OUT))
-    time, first = np.unique(recording.flagged_time[chosen] - find_start(recording), return_index=True)
-    yield SeriesGroup(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[chosen][first]),))
+    """Yield the output force of samples that were left out, where they have one: by the user, and for other reasons."""
+    by_user = np.array(recording.flagged_kind, dtype=str) == BY_USER
+    for label, color, mask in ((LEFT_OUT, "gray", by_user), ("Output left out", "purple", ~by_user)):
+        finite = np.flatnonzero(np.isfinite(recording.flagged_output) & mask)
+        if len(finite):
+            chosen = np.array(choose_evenly(finite.tolist(), _MAX_LEFT_OUT))
+            time, first = np.unique(recording.flagged_time[chosen] - find_start(recording), return_index=True)
+            yield SeriesGroup(time, (Series(label, "hollow", color, recording.flagged_output[chosen][first]),))

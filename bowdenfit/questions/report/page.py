@@ -42,6 +42,7 @@ from bowdenfit.questions.summary.sections import (
 )
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.questions.writing import write_page
+from bowdenfit.results.data_changes import find_data_changes
 from bowdenfit.results.folder import REPORT, file_to_write
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load
@@ -80,7 +81,11 @@ def _figure_picture(name: str, data: Any) -> Picture:
 
 
 def report_page(
-    fit: Record, figures: dict[str, Any], ranking: NextMeasurement | None = None, changes: PageSection | None = None
+    fit: Record,
+    figures: dict[str, Any],
+    ranking: NextMeasurement | None = None,
+    changes: PageSection | None = None,
+    outdated: str = "",
 ) -> HtmlPage:
     """Return the report of a fit.
 
@@ -89,10 +94,12 @@ def report_page(
         figures: Data of the figures that are on it, by name.
         ranking: Ranking of further measurements; a sentence says how to ask if omitted.
         changes: Changes since an earlier fit; none are shown if omitted.
+        outdated: Which data have changed since this fit, in a sentence.
     """
     (answer, *above), below = ([make_section(fit) for make_section in group] for group in (ABOVE_FIGURES, BELOW_FIGURES))
     following = next_step_section(fit) if ranking is None else ranking_section(ranking)
-    sections = [answer, changes, *above, figures_section(figures), checks_section(fit), following, *below]
+    newer = prose_section("Newer data", [outdated]) if outdated else None
+    sections = [answer, newer, changes, *above, figures_section(figures), checks_section(fit), following, *below]
     when = f", {fit.provenance.created[:10]}" if fit.provenance.created else ""
     subtitle = f"Report of a fit by bowdenfit {fit.provenance.versions.get('bowdenfit', '')}{when}"
     return HtmlPage(fit.name, subtitle, tuple(section for section in sections if section is not None))
@@ -116,11 +123,12 @@ def write_report(
         UsageError: A fit is given without a file.
         StoreError: The results folder is missing or damaged, or the file cannot be written.
     """
-    figures = dict[str, Any]()
+    figures, outdated = dict[str, Any](), ""
     guard: AbstractContextManager[None] = nullcontext()
     if isinstance(fit, str | Path):
         folder = Path(fit)
         output, fit, figures = output or folder / REPORT, load(folder), read_figure_data(folder)
+        outdated = find_data_changes(folder).describe()
         guard = damage_as(damaged_figure_data(folder)) if figures else guard
     if output is None:
         raise UsageError("a fit on its own has no folder; name a file for the report.")
@@ -131,7 +139,7 @@ def write_report(
     with guard, file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:
         for name, data in figures.items():
             write_figure_files(name, data, Path(figures_folder), (PNG,), fit.name, mark=mark)
-        write_page(report_page(fit, figures, ranking, changes), Path(figures_folder), temporary)
+        write_page(report_page(fit, figures, ranking, changes, outdated), Path(figures_folder), temporary)
     return path
 
 

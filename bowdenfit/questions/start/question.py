@@ -42,8 +42,8 @@ class Question(Generic[Answer]):
         default: Answer that Enter gives; None where nothing may be proposed.
         why: What the files do not say, and what would say it, in a sentence; with a default beside it, that is only proposed.
         example: An answer where there is no default, to show how it is written.
-        options: Answers that may be given by a number, from 1, each in words.
-        form: How it is answered: by a text, by one of the options, by the numbers of several, or by yes or no.
+        options: Answers that may be given by a number, from 1, each in words; of a word the words themselves.
+        form: How it is answered: by a text, by one of the options, by the numbers of several, by yes or no, or by a word.
     """
 
     words: str
@@ -52,7 +52,7 @@ class Question(Generic[Answer]):
     why: str = ""
     example: str = ""
     options: tuple[str, ...] = ()
-    form: Literal["text", "choice", "several", "yes or no"] = "text"
+    form: Literal["text", "choice", "several", "yes or no", "word"] = "text"
 
 
 @runtime_checkable
@@ -158,7 +158,7 @@ def word_question(words: str, known: Sequence[str], default: str) -> Question[st
             raise UsageError(f"{shown(typed)} is not known{suggest_name(typed.strip(), known)}")
         return typed.strip()
 
-    return Question(words, read, default)
+    return Question(words, read, default, options=tuple(known), form="word")
 
 
 def unit_question(words: str, dimension: str, why: str, default: str | None = None) -> Question[str]:

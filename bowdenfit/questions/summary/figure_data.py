@@ -48,7 +48,8 @@ def collect_forces(fit: Record) -> ForcesData | None:
     count = len(table.run) if len(rows) < len(table.run) else 0
     reason = next(iter(fit_verdict.reasons), "")
     model = fit.dataset.description.friction_model
-    return ForcesData(tuple(bends), load, spread, model, fit_verdict.trusted, reason, logarithmic, count)
+    left_out = fit.dataset.measurements.excluded_points("forces", "input_force", "output_force")
+    return ForcesData(tuple(bends), load, spread, model, fit_verdict.trusted, reason, logarithmic, count, left_out)
 
 
 def _group_rows(fit: Record, table: ForceTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str], set[int]]:

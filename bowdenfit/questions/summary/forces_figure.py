@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.captions import describe_left_out
 from bowdenfit.plots.curves import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrap_words
-from bowdenfit.plots.panels import make_logarithmic
+from bowdenfit.plots.panels import draw_left_out, make_logarithmic
 from bowdenfit.plots.style import (
     BLACK,
     GRAY,
@@ -96,6 +97,7 @@ class ForcesData:
         verdict: In words.
         logarithmic: Whether loads are so different that axes are logarithmic.
         count: How many readings there are, where not all are shown; else 0.
+        left_out: Input and output force of the readings that the user leaves out [N].
     """
 
     places: tuple[ForcesAtBend, ...]
@@ -106,6 +108,7 @@ class ForcesData:
     verdict: str
     logarithmic: bool
     count: int = 0
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
     @property
     def by_bend(self) -> bool:
@@ -134,8 +137,8 @@ def caption(forces: ForcesData) -> str:
         f"bend; {band}. Strip below: residuals, each reading relative to its line, in percent, with the band in which nine of "
         "ten single readings should lie. Last panel: the apparent friction coefficient, that of each reading by itself by the "
         f"capstan equation; where that equation holds, it is the same at all loads. {edge}"
-        f"n = {counted(n, 'reading')}."
-    )
+        f"n = {counted(n, 'reading')}. {describe_left_out(forces.left_out)}"
+    ).rstrip()
 
 
 @in_paper_style
@@ -213,6 +216,8 @@ def _draw_forces(axes: Axes, forces: ForcesData) -> None:
     axes.set_xlim(*(bends if forces.by_bend else (load[0] if forces.logarithmic else 0.0, load[-1])))
     out = np.concatenate([here.output_force for here in forces.places])
     axes.set_ylim((0.7 * out.min(), 1.4 * out.max()) if forces.logarithmic else (0.0, 1.08 * max(out.max(), load[-1])))
+    if not forces.by_bend:
+        draw_left_out(axes, forces.left_out)
     axes.set_ylabel("Output force (N)")
     axes.tick_params(labelbottom=False)
 

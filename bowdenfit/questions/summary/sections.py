@@ -31,7 +31,7 @@ from bowdenfit.questions.summary.verdict import (
     suggest_next_step,
 )
 from bowdenfit.results.record import Record
-from bowdenfit.words import counted
+from bowdenfit.words import counted, listed
 
 _HEADS = ("coefficient", "value", "90 % interval", "unit", "what it is")
 _MOST_CORRELATED = 30  # parameters in a table of correlations
@@ -122,6 +122,8 @@ def provenance_section(fit: Record) -> PageSection:
     made, files = fit.provenance, fit.dataset.sha256
     versions = ", ".join(f"{name} {version}" for name, version in made.versions.items())
     when = f", finished {made.created}" if made.created else ""
+    start = listed([f"{name} = {value:.6g}" for name, value in made.start.items()])
+    when += f"; the search began at {start} too" if start else ""
     return prose_section(
         "Where the numbers come from",
         [f"Seed {made.seed}{when}. The same files, versions and seed give the same numbers.", f"{versions}."],

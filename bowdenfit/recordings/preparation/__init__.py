@@ -26,6 +26,7 @@ from bowdenfit.recordings.preparation.blocks import (
 from bowdenfit.recordings.preparation.checks import FEWEST_SAMPLES, check_recording, check_sign
 from bowdenfit.recordings.preparation.clock import (
     DROPOUT,
+    EXCLUDED,
     GOOD,
     KINDS,
     NO_OVERLAP,
@@ -36,13 +37,13 @@ from bowdenfit.recordings.preparation.clock import (
     step_of,
 )
 from bowdenfit.recordings.preparation.delay import BEYOND, RANGE, Delay, estimate_delay
+from bowdenfit.recordings.preparation.excluded import collect_flagged
 from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import describe_noise, estimate_tare, noise_about_trend
 from bowdenfit.recordings.preparation.shift_scan import AS_WELL, OVERLAP, LateOutput, ShiftScan, scan_shifts
-from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
+from bowdenfit.recordings.recording import Account, Blocks, RawRecording
 from bowdenfit.types import Flags, Vector
 
-_SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _MIRRORED = -0.9  # judged: correlation below which the output falls by all that the input rises
 _USUAL_BLOCK = 0.05
 _POINTS_OF_SCAN = 1 << 13  # judged: 22 points in each of 360 cycles, the most that a recording may have
@@ -196,7 +197,7 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
         delay_sd=delay.sd,
         noise=noise,
         limits=cleaned.limits,
-        flagged=_flagged(common),
+        flagged=collect_flagged(common, raw, delay.value),
         remarks=(*remarks, *_remarks(cleaned, delay, counts)),
         sample_sd=sample_sds,
         noise_time=noise_times,
@@ -210,6 +211,9 @@ def _clean(raw: RawRecording, settings: Preparation) -> _Cleaned:
     forces = raw.input_force, raw.output_force
     pairs = ((0, 1), (1, 0))
     flagged = [flag_samples(times[one], forces[one], times[two], forces[two], settings) for one, two in pairs]
+    if raw.excluded is not None:
+        for channel, _ in flagged:
+            channel.fault[raw.excluded.covers(channel.time)] = EXCLUDED
     names = "input_force", "output_force"
     tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, flagged, strict=True)]
     channels = [
@@ -388,17 +392,6 @@ def _samples_of_block(
         return choose_block_samples(common, bandwidth, main, per_sample, raw.loop)
     block = _stated_block(settings)
     return max(1, round(block / common.step)) if block > 0 else 0
-
-
-def _flagged(common: CommonClock) -> FlaggedSamples:
-    """Return the samples left out, evenly thinned to a few hundred of each kind, in order of time."""
-    chosen = []
-    for kind in range(GOOD + 1, NO_OVERLAP):
-        positions = np.flatnonzero(common.fault == kind)
-        chosen.append(positions[np.unique(np.linspace(0, len(positions) - 1, min(len(positions), _SHOWN_FLAGS)).astype(int))])
-    at = np.sort(np.concatenate(chosen))
-    kinds = tuple(KINDS[k] for k in common.fault[at].tolist())
-    return FlaggedSamples(kinds, common.time[at], common.input_force[at], common.output_force[at])
 
 
 def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[str]:

@@ -8,8 +8,8 @@ from bowdenfit.files.pieces import have_same_numbers, never_falls, split_pieces,
 from bowdenfit.types import Flags, Labels, OtherLabels, OtherVector, Vector
 
 GAP_STEPS = 5  # judged: usual steps, from which on a step is a gap
-GOOD, SPIKE, SATURATED, DROPOUT, QUIET, NO_OVERLAP = range(6)
-KINDS = ("used", "spike", "saturated", "dropout", "quiet", "no overlap")
+GOOD, SPIKE, SATURATED, DROPOUT, QUIET, EXCLUDED, NO_OVERLAP = range(7)
+KINDS = ("used", "spike", "saturated", "dropout", "quiet", "by the user", "no overlap")
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Sampled:
     Args:
         time: Time of each sample, strictly increasing [s].
         force: Readings [N]; NaN where missing.
-        fault: `GOOD`, `SPIKE`, `SATURATED` or `DROPOUT`, one a sample.
+        fault: `GOOD`, `SPIKE`, `SATURATED`, `DROPOUT` or `EXCLUDED`, one a sample.
         gap: Whether the clock jumps after a sample; such times count as dropouts of this channel.
     """
 

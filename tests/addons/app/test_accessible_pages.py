@@ -1,19 +1,13 @@
 """Pages without serious findings of axe-core, and a walk from the start to a fit by the keyboard alone."""
 
 import shutil
-import subprocess
-import tarfile
 from pathlib import Path
 
 import pytest
-from app_in_browser import faults_of, served, visiting
+from app_in_browser import faults_of, serious_findings, served, visiting
 from offline_browser import browser
 
 DATASETS = Path(__file__).parents[3] / "datasets"
-_AXE = "axe-core@4.10.2"
-_RUN = """async () => (await axe.run(document, { resultTypes: ["violations"] })).violations
-  .filter(fault => ["serious", "critical"].includes(fault.impact) || fault.id.includes("main"))
-  .map(fault => `${fault.impact}, ${fault.id}: ${fault.nodes.map(node => node.html.slice(0, 120)).join(" | ")}`)"""
 _FOCUS = """() => {
   const focused = document.activeElement, style = getComputedStyle(focused);
   const isSeen = focused === document.body || (style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1);
@@ -26,20 +20,6 @@ def chromium():
     """A browser; tests are skipped where there is none."""
     with browser() as program:
         yield program
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory):
-    """The script of axe-core, from npm; the test is skipped where that cannot be reached."""
-    npm, folder = shutil.which("npm"), tmp_path_factory.mktemp("axe")
-    if npm is None:
-        pytest.skip("there is no npm to get axe-core with")
-    command = [npm, "pack", _AXE, "--silent", "--pack-destination", str(folder)]
-    packed = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, cwd=folder)
-    if packed.returncode:
-        pytest.skip(f"npm cannot get axe-core: {packed.stderr.strip()[-200:]}")
-    with tarfile.open(folder / packed.stdout.split()[-1]) as archive:
-        return archive.extractfile("package/axe.min.js").read().decode()
 
 
 @pytest.mark.extended
@@ -59,8 +39,7 @@ def test_no_page_has_a_serious_finding(chromium, axe, tmp_path, quick_results, w
         def look(place):
             page.evaluate("() => document.querySelectorAll('details').forEach(part => { part.open = true; })")
             page.wait_for_timeout(300)
-            page.evaluate(axe)
-            findings.extend((place, finding) for finding in (*page.evaluate(_RUN), *faults_of(page)))
+            findings.extend((place, finding) for finding in (*serious_findings(page, axe), *faults_of(page)))
 
         for place, shown in places.items():
             page.goto(f"{visit.root}{place}")

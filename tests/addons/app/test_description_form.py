@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bowdenfit.addons.app.describe import find_fault
+from bowdenfit.addons.app.describe import find_faults
 from bowdenfit.addons.app.description_form import MENU, add_part, list_groups, set_field, show_value
 from bowdenfit.errors import UsageError
 from bowdenfit.kinds.descriptions import CableDescription, parse_description
@@ -81,11 +81,11 @@ def test_what_cannot_be_read_is_refused(path, typed, words):
 def test_parts_are_added_and_refused_by_the_name_of_others():
     text = add_part(BENCH, "contact", "ferrule")
     assert tomllib.loads(text)["contact"][-1]["name"] == "ferrule"
-    assert find_fault(text) == ""
+    assert find_faults(text) == []
     with pytest.raises(UsageError, match="not in use yet"):
         add_part(text, "contact", "ferrule")
-    assert "TOML" in find_fault("name = ")
-    assert "unknown key 'sampler.walkers'" in find_fault(f"{BENCH}\n[sampler]\nwalkers = 3\n")
+    assert "TOML" in find_faults("name = ")[0]
+    assert "unknown key 'sampler.walkers'" in find_faults(f"{BENCH}\n[sampler]\nwalkers = 3\n")[0]
 
 
 def test_values_are_shown_as_they_are_typed():

@@ -31,7 +31,7 @@ def test_a_fit_says_when_it_was_made_and_what_it_answers(workbench):
     assert past.seed == str(summary["seed"]) and page["provenance"]["created"].startswith(past.date.replace(" ", "T"))
     assert " ".join((folder / "summary.txt").read_text().split()).startswith(past.answer) and len(past.answer) > 20
     assert (past.state == GOOD) <= summary["verdict"]["trusted"]
-    assert (past.data_set, past.changed, past.change) == ("on-body", (), "")
+    assert (past.data_set, past.changes.files, past.changes.describe()) == ("on-body", (), "")
 
 
 @pytest.mark.parametrize("name", ["cable.toml", "efficiencies.csv"])
@@ -39,20 +39,21 @@ def test_a_fit_whose_data_have_changed_says_so(workbench, name):
     path = workbench.data_set("on-body") / name
     path.write_text(path.read_text() + "\n# more\n")
     past = read_past_fit(workbench, "on-body-2")
-    assert (past.data_set, past.changed) == ("on-body", (name,))
-    assert past.change == f"Changed since this fit: '{name}'. Fit again for an answer from the data as they are now."
+    assert (past.data_set, past.changes.files) == ("on-body", (name,))
+    again = "Fit again for an answer from the data as they are now."
+    assert past.changes.describe() == f"Changed since this fit: '{name}'. {again}"
 
 
 def test_a_file_that_is_gone_counts_as_changed(workbench):
     (workbench.data_set("on-body") / "efficiencies.csv").unlink()
-    assert read_past_fit(workbench, "on-body-2").changed == ("efficiencies.csv",)
+    assert read_past_fit(workbench, "on-body-2").changes.files == ("efficiencies.csv",)
 
 
 def test_a_damaged_fit_and_one_that_names_files_elsewhere_end_nothing(workbench):
     folder = workbench.results("on-body-2")
     page = json.loads((folder / "fit.json").read_text())
     (folder / "fit.json").write_text(json.dumps(page | {"sha256": page["sha256"] | {"../../secret": "0", "/etc/passwd": "0"}}))
-    assert read_past_fit(workbench, "on-body-2").changed == ()
+    assert read_past_fit(workbench, "on-body-2").changes.files == ()
     for text in ("[]", "{}", "{"):
         (folder / "summary.json").write_text(text)
         assert read_past_fit(workbench, "on-body-2") == PastFit("on-body-2")

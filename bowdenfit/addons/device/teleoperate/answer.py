@@ -167,7 +167,7 @@ def _wall_sentences(answer: Teleoperation) -> Iterator[str]:
         yield f"Through this cable a hand feels no wall without bouncing with {sure} probability, {bends}; {at}."
     else:
         yield (
-            f"Through this cable a hand feels walls of up to {significant(hardest)} N*m/rad without bouncing with at least "
+            f"Through this cable a hand feels walls of up to {significant(hardest, 2)} N*m/rad without bouncing with at least "
             f"{sure} probability, {_describe_bends(answer)}; {at}."
         )
 
@@ -296,5 +296,5 @@ def _format_hardest(answer: Teleoperation, scheme: CouplingScheme) -> str:
         if scheme.hardest is None
         else "none"
         if scheme.hardest <= 0
-        else significant(scheme.hardest)
+        else significant(scheme.hardest, 2)
     )

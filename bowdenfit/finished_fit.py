@@ -134,7 +134,7 @@ class Fit(Record):
             UsageError: There is no posterior, or a length is no number, or outside the range of the angle curves no wrap
                 angle was measured at it.
         """
-        return Record.efficiency(with_bench_errors(self), lengths)
+        return with_bench_errors(self).efficiency_of_draws(lengths)
 
     def correlation(self) -> "DataFrame":
         """Return the correlations of the draws of all parameters, as a square table.

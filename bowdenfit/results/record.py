@@ -217,16 +217,8 @@ class Record(Display):
         draws = self.draws()
         return draw_new_mounting(self.dataset.description, draws.values, len(draws.flat_z), self.provenance.seed)
 
-    def efficiency(self, lengths: float | Iterable[float] | None = None) -> Efficiencies:
-        """Return the efficiency at values of the route variable, with intervals.
-
-        Args:
-            lengths: Route values; the description's choices if omitted.
-
-        Raises:
-            UsageError: There is no posterior, or a length is no number, or outside the range of the angle curves no wrap
-                angle was measured at it.
-        """
+    def efficiency_of_draws(self, lengths: float | Iterable[float] | None = None) -> Efficiencies:
+        """Return the efficiency at values of the route variable by these draws; see `bowdenfit.Fit.efficiency`."""
         at = self._lengths(lengths)
         parts = split_lengths(at)
         outside = choose_angles(self.dataset, at, NO_ANGLES, self.provenance.seed).outside
@@ -234,7 +226,7 @@ class Record(Display):
         return Efficiencies(intervals, self.dataset.description.route, at, outside)
 
     def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:
-        """Return the efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
+        """Return the efficiency of every draw (rows) at values of the route variable (columns)."""
         at, z = self._lengths(lengths), self.draws().flat_z
         angles = choose_angles(self.dataset, at, NO_ANGLES, self.provenance.seed)
         with jax.enable_x64(True):

@@ -47,6 +47,11 @@ def test_a_fit_keeps_where_its_data_are_and_finds_them_changed_added_and_gone(be
     assert words.startswith("Changed since the fit of June: 'cable.toml' and 'efficiencies-2.csv'")
 
 
+def test_a_folder_elsewhere_is_not_said(bench, tmp_path):
+    assert locate_data_set(tmp_path, bench / "fits" / "knee") == {} == locate_data_set(None, bench)
+    assert locate_data_set(bench / "measured", tmp_path / "fits" / "knee") == {"data_set": "../../bench/measured"}
+
+
 def test_nothing_is_reported_of_data_that_are_gone_or_elsewhere(bench, tmp_path):
     results = bench / "fits" / "knee"
     shutil.copytree(bench / "measured" / "on-body", tmp_path / "elsewhere")

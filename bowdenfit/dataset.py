@@ -30,7 +30,8 @@ from bowdenfit.kinds.descriptions import (
 from bowdenfit.kinds.fit_command import make_ambiguity_error, require_recordings
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, refuse_several_sheets, understand
 from bowdenfit.kinds.measured_columns import refuse_far_forces
-from bowdenfit.kinds.table_files import Source
+from bowdenfit.kinds.rows import convert_excluded
+from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.units import ColumnSource
@@ -241,14 +242,7 @@ def read_dataset(
             continue
         with faults.collect():
             read = kind.read(Source(kind.name, settings, description, folder, channels or {}))
-            remarks = (*(remark for account in read.accounts for remark in account.remarks), *read.remarks)
-            excluded = tuple(reading for account in read.accounts for reading in account.excluded)
-            measurements = replace(
-                measurements,
-                tables=(*measurements.tables, read.table),
-                remarks=(*measurements.remarks, *remarks),
-                excluded=measurements.excluded | ({kind.name: excluded} if excluded else {}),
-            )
+            measurements = _add_table(measurements, read, kind.name, description)
             accounts += read.accounts
             checksums |= {name: sha256_of(path) for name, path in read.files.items()}
     if sentence := description.tables.describe_excluded():
@@ -269,3 +263,18 @@ def read_dataset(
             kind.check(table, description, measurements)
     faults.refuse()
     return Dataset(description, measurements, checksums, accounts, folder)
+
+
+def _add_table(
+    measurements: Measurements, read: TableFromFiles[Any], kind: str, description: Description
+) -> Measurements:
+    """Return the measurements with one more table, with its remarks and the readings of it that the user leaves out."""
+    remarks = (*(remark for account in read.accounts for remark in account.remarks), *read.remarks)
+    rows = (row for account in read.accounts for row in account.excluded)
+    excluded = tuple(convert_excluded(row, description) for row in rows)
+    return replace(
+        measurements,
+        tables=(*measurements.tables, read.table),
+        remarks=(*measurements.remarks, *remarks),
+        excluded=measurements.excluded | ({kind: excluded} if excluded else {}),
+    )

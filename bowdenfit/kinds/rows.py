@@ -3,7 +3,8 @@
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import partial
 from typing import Literal, Protocol, runtime_checkable
@@ -14,6 +15,7 @@ from bowdenfit.description import Description, Route
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require_column
+from bowdenfit.files.row_account import ExcludedReading
 from bowdenfit.files.tables import RawTable
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown, significant
@@ -343,3 +345,16 @@ def stroke_signs(strokes: Sequence[Stroke]) -> list[int]:
 def convert_to_radians(degrees: Sequence[float]) -> Vector:
     """Return wrap angles in rad, as tables have them."""
     return np.deg2rad(np.array(degrees, dtype=float))
+
+
+def convert_excluded(reading: ExcludedReading, description: Description) -> ExcludedReading:
+    """Return a reading that the user leaves out with the forces on the rope, as `convert_to_forces` gives those of others."""
+    values = dict(reading.values)
+    for end in ("input", "output"):
+        force, torque = f"{end}_force", f"{end}_torque"
+        with suppress(DatasetError):
+            if torque in values and force not in values:
+                values[force] = float(description.cable.pulleys.forces(np.array([values[torque]]), end, reading.file)[0])
+        if force in values:
+            values[force] *= description.sensors.ratio(end)
+    return replace(reading, values=values)

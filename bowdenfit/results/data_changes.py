@@ -51,15 +51,25 @@ class DataChanges:
 def locate_data_set(folder: Path | None, results: Path) -> dict[str, str]:
     """Return what fit.json says of where the data set is: its folder as seen from the results folder.
 
+    A folder in which it would not be looked for is not said.
+
     Args:
         folder: Folder of the data set; None without one.
         results: The results folder.
     """
-    if folder is None or not folder.is_dir():  # a data frame was read from a folder that is gone
-        return {}
-    with suppress(ValueError):  # on another drive
-        return {DATA_SET: Path(os.path.relpath(folder.resolve(), results.resolve())).as_posix()}
-    return {}
+    if folder is None or not folder.is_dir() or not _is_near(folder.resolve(), results.resolve()):
+        return {}  # a data frame, for one, was read from a folder that is gone
+    return {DATA_SET: Path(os.path.relpath(folder.resolve(), results.resolve())).as_posix()}
+
+
+def _is_near(folder: Path, results: Path) -> bool:
+    """Whether a folder is below the working folder, or below the one that holds the results."""
+    return any(folder.is_relative_to(place) for place in (_folder_above(results), Path.cwd().resolve()))
+
+
+def _folder_above(results: Path) -> Path:
+    """Return the folder next to whose data sets a results folder usually is."""
+    return results.parent.parent if results.parent.name == _USUAL_FOLDER else results.parent
 
 
 def find_data_changes(results: Path, checksum: Callable[[Path], str] = sha256_of) -> DataChanges:
@@ -90,12 +100,11 @@ def _find_data_set(
 ) -> Path | None:
     """Return the folder of the data set: where the fit says it is, or one next to the results that is likely to be it."""
     folder = results.resolve()
-    above = folder.parent.parent if folder.parent.name == _USUAL_FOLDER else folder.parent
+    above = _folder_above(folder)
     if isinstance(page.get(DATA_SET), str):
         stated = (folder / page[DATA_SET]).resolve()
         expected = [_DESCRIPTION] if _DESCRIPTION in checksums else checksums
-        is_near = any(stated.is_relative_to(place) for place in (above, Path.cwd().resolve()))
-        if is_near and any((stated / name).exists() for name in expected):
+        if _is_near(stated, folder) and any((stated / name).exists() for name in expected):
             return stated
     if _DESCRIPTION not in checksums:
         return None

@@ -86,14 +86,21 @@ def fit(
                 result = run.fit_posterior(data, seed, checkpoint, resume, show, start or {})
             else:
                 result = run.fit_classically(data, seed, start or {})
-            for sentence in run.save_results(result, folder) if folder is not None else ():
-                report(sentence)
-            if folder is not None and result.converged:
-                remove_checkpoint(folder)
-            answered(result)
-            for sentence in run.draw_results(result, folder, figures) if folder is not None else ():
-                report(sentence)
+            _write(result, folder, figures, report, answered)
     return result
+
+
+def _write(
+    result: "Fit", folder: Path | None, figures: bool, report: Callable[[str], None], answered: "Callable[[Fit], object]"
+) -> None:
+    """Write a fit where there is a folder, and hand it on as soon as it is written, before its figures are drawn."""
+    for sentence in run.save_results(result, folder) if folder is not None else ():
+        report(sentence)
+    if folder is not None and result.converged:
+        remove_checkpoint(folder)
+    answered(result)
+    for sentence in run.draw_results(result, folder, figures) if folder is not None else ():
+        report(sentence)
 
 
 def _reply(fit: "Fit", request: dict[str, Any]) -> Reply:

@@ -119,9 +119,10 @@ def test_each_figure_of_a_table_shows_those_of_the_table(tmp_path):
         folder = shutil.copytree(DATASETS / name, tmp_path / name)
         text = (folder / "cable.toml").read_text()
         left_out = 'exclude = [{ rows = [4], reason = "the rope jumped" }]'
-        text = re.sub(r'(file = "(efficiencies|angles|stretch|preload).csv")', rf"\1, {left_out}", text)
+        text = re.sub(r'(file = "(efficiencies|angles|stretch|preload|loop).csv")', rf"\1, {left_out}", text)
         (folder / "cable.toml").write_text(text)
-        shown |= dict(collect_figure_data(bf.fit(folder, mcmc=False), ("efficiency", "wrap_angles", "stretch", "preload")))
+        names = ("efficiency", "wrap_angles", "stretch", "preload", "loops")
+        shown |= dict(collect_figure_data(bf.fit(folder, mcmc=False), names))
     assert_readable(shown, "cable")
     for name, data in shown.items():
         figure, words = FIGURES[name].draw(data), FIGURES[name].caption(data)
@@ -129,3 +130,15 @@ def test_each_figure_of_a_table_shows_those_of_the_table(tmp_path):
         assert LEFT_OUT in entries and "1 reading left out by the user" in words, name
     (chart,) = make_efficiency_chart(shown["efficiency"])
     assert [series.color for group in chart.groups for series in group.series if series.label == LEFT_OUT] == ["gray"]
+
+
+def test_they_are_forces_on_the_rope_whatever_was_read(bench):
+    folder = bench('{ rows = [3], reason = "x" }')
+    text = (folder / "cable.toml").read_text()
+    (folder / "cable.toml").write_text(f"{text}[sensors]\ninput_ratio = 2\n")
+    (reading,) = bf.read(folder).measurements.excluded["forces"]
+    assert reading.values["input_force"] == 80 and reading.values["output_force"] == 30.1
+    (folder / "forces.csv").write_text((folder / "forces.csv").read_text().replace("input_force_N", "input_torque_Nm"))
+    (folder / "cable.toml").write_text(f'{text}[cable]\ninput_pulley_radius = {{ value = 500, unit = "mm" }}\n')
+    (reading,) = bf.read(folder).measurements.excluded["forces"]
+    assert reading.values["input_force"] == pytest.approx(80)

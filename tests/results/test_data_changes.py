@@ -31,9 +31,9 @@ def state(results, **keys):
 
 def test_a_fit_keeps_where_its_data_are_and_finds_them_changed_added_and_gone(bench, quick_results):
     results, data = bench / "fits" / "knee", bench / "measured" / "on-body"
-    stated = json.loads((quick_results / "fit.json").read_text())
-    assert (quick_results / stated["data_set"]).resolve() == DATASETS / "on-body-exoskeleton"
-    assert {*stated["sha256"]} == FILES and find_data_changes(results) == DataChanges(data)
+    page = json.loads((quick_results / "fit.json").read_text())
+    assert (quick_results / page["data_set"]).resolve() == DATASETS / "on-body-exoskeleton"
+    assert {*page["sha256"]} == FILES and find_data_changes(results) == DataChanges(data)
     (data / "angles.csv").write_text((data / "angles.csv").read_text() + "# more\n")
     (data / "efficiencies.csv").unlink()
     assert find_data_changes(results).files == ("angles.csv", "efficiencies.csv")
@@ -45,6 +45,11 @@ def test_a_fit_keeps_where_its_data_are_and_finds_them_changed_added_and_gone(be
     assert find_data_changes(results).files == ("cable.toml", "efficiencies-2.csv")
     words = find_data_changes(results).describe("the fit of June")
     assert words.startswith("Changed since the fit of June: 'cable.toml' and 'efficiencies-2.csv'")
+
+
+def test_a_folder_elsewhere_is_not_said(bench, tmp_path):
+    assert locate_data_set(tmp_path, bench / "fits" / "knee") == {} == locate_data_set(None, bench)
+    assert locate_data_set(bench / "measured", tmp_path / "fits" / "knee") == {"data_set": "../../bench/measured"}
 
 
 def test_nothing_is_reported_of_data_that_are_gone_or_elsewhere(bench, tmp_path):

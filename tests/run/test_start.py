@@ -17,17 +17,17 @@ START = {"mu1": 0.3, "mu3": 0.05}
 
 
 def test_the_search_begins_at_the_stated_values_besides_its_own(on_body, monkeypatch):
-    begun = []
+    starts = []
     solve = Problem.solve
-    monkeypatch.setattr(Problem, "solve", lambda self, start, *more: (begun.append(start), solve(self, start, *more))[1])
+    monkeypatch.setattr(Problem, "solve", lambda self, start, *more: (starts.append(start), solve(self, start, *more))[1])
     with jax.enable_x64(True):
         density = LogDensity(build_model(bf.read(on_body)))
         space, objective = density.model.space, make_objective(density)
         usual = find_maximum_posterior(density, objective)
-        count = len(begun)
+        count = len(starts)
         again = find_maximum_posterior(density, objective, read_start(space, START))
-        assert len(begun) == 2 * count + 1
-        values = {name: float(value) for name, value in space.constrain(begun[-1]).items()}
+        assert len(starts) == 2 * count + 1
+        values = {name: float(value) for name, value in space.constrain(starts[-1]).items()}
     assert {name: values[name] for name in START} == pytest.approx(START)
     np.testing.assert_allclose(again.z, usual.z, atol=1e-4)
 

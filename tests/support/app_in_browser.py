@@ -2,8 +2,10 @@
 
 import queue
 import re
+import shutil
 import subprocess
 import sys
+import tarfile
 import threading
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,8 +13,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import pytest
 from offline_browser import FAULTS
 
+_AXE = "axe-core@4.10.2"
 _ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one footer")  # what an app has, and a report has not
 PATIENCE = 60_000  # ms; a machine with other work on it loads JAX slowly
 
@@ -37,6 +41,23 @@ def faults_of(page):
 _SERIOUS = """async () => (await axe.run(document, { resultTypes: ["violations"] })).violations
   .filter(fault => ["serious", "critical"].includes(fault.impact) || fault.id.includes("main"))
   .map(fault => `${fault.impact}, ${fault.id}: ${fault.nodes.map(node => node.html.slice(0, 120)).join(" | ")}`)"""
+
+
+def get_axe(folder: Path) -> str:
+    """Return the script of axe-core, from npm; the test is skipped where that cannot be reached.
+
+    Args:
+        folder: Where npm puts it.
+    """
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("there is no npm to get axe-core with")
+    command = [npm, "pack", _AXE, "--silent", "--pack-destination", str(folder)]
+    packed = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, cwd=folder)
+    if packed.returncode:
+        pytest.skip(f"npm cannot get axe-core: {packed.stderr.strip()[-200:]}")
+    with tarfile.open(folder / packed.stdout.split()[-1]) as archive:
+        return archive.extractfile("package/axe.min.js").read().decode()
 
 
 def serious_findings(page, axe):

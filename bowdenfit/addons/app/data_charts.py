@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bowdenfit.addons.app import angle_charts, friction_charts, recording_charts, rope_charts
+from bowdenfit.addons.app import angle_charts, friction_charts, motion_charts, recording_charts, rope_charts
 from bowdenfit.addons.app.measured_rows import MeasuredRows, UnusedRow
 from bowdenfit.addons.app.points import COLORS, Drawers, Points, make_chart
 from bowdenfit.kinds import iterate_tables
@@ -14,6 +14,7 @@ from bowdenfit.words import counted
 
 _DRAWERS: Drawers = {
     **friction_charts.DRAWERS, **angle_charts.DRAWERS, **recording_charts.DRAWERS, **rope_charts.DRAWERS,
+    **motion_charts.DRAWERS,
 }  # fmt: skip
 _MARKS = {"Left out by you": "Gray, left out by you", "Refused": "Red, refused"}
 

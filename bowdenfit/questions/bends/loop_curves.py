@@ -49,9 +49,27 @@ def collect_loops(fit: Record) -> tuple[LoopCurve, ...] | None:
         forward, back, slack = (quantiles_of_draws(draws[name][:, i]) for name in ("forward", "back", "slack"))
         mask = np.isclose(angle, bend)
         points = force_in[mask], force_out[mask], stroke[mask]
-        capstan = np.median(draws["capstan"][:, i], axis=0)
-        loops.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points))
+        capstan, left_out = np.median(draws["capstan"][:, i], axis=0), _find_left_out(fit, float(bend), angles)
+        loops.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points, left_out))
     return tuple(loops)
+
+
+def _find_left_out(fit: Record, bend: float, angles: np.ndarray) -> np.ndarray:
+    """Return input and output force [N] of the readings that the user leaves out, of those nearest to one of some wrap angles.
+
+    Args:
+        fit: The fit.
+        bend: Which wrap angle [rad].
+        angles: All of them [rad].
+    """
+    description = fit.dataset.description
+    constant = sum(c.wrap_angle.constant.to("angle") for c in description.contact if c.wrap_angle.constant)
+    forces = []
+    for values in (reading.values for reading in fit.dataset.measurements.excluded.get("loop", ())):
+        angle = constant + sum(values.get(column, 0.0) for column in description.angle_columns)
+        if angles[np.argmin(np.abs(angles - angle))] == bend and {"input_force", "output_force"} <= {*values}:
+            forces.append((values["input_force"], values["output_force"]))
+    return np.array(forces).reshape(-1, 2).T
 
 
 def collect_bending_loss(fit: Record) -> BendingLoss | None:

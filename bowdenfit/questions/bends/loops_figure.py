@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_left_out, describe_strip
 from bowdenfit.plots.curves import choose_evenly, draw_quantiles, middle, name_band, note_shown_count
 from bowdenfit.plots.layout import legend_above, panel_size
-from bowdenfit.plots.panels import enlarge_marks, span
+from bowdenfit.plots.panels import draw_left_out, enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
 from bowdenfit.questions import bends as room
@@ -47,6 +47,7 @@ class LoopCurve:
         slack_load: Quantiles of the input force at which the return side goes slack [N].
         points_input, points_output: Readings [N].
         points_stroke: +1 forward, -1 back; twice that of a recording, and 0 where it is neither.
+        left_out: Input and output force of the readings that the user leaves out [N].
     """
 
     label: str
@@ -58,6 +59,7 @@ class LoopCurve:
     points_input: np.ndarray
     points_output: np.ndarray
     points_stroke: np.ndarray
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 def data(fit: Record) -> tuple[LoopCurve, ...] | None:
@@ -71,8 +73,9 @@ def caption(loops: tuple[LoopCurve, ...]) -> str:
     return (
         f"Output against input force of the loop, moving forward and back, at {count_shown(shown, len(loops), 'wrap angle')}. "
         f"{describe_curve(len(loops[0].forward) > 1)} Dashed: a rope without preload. Purple: the input force beyond which the "
-        f"return side is slack. {describe_strip('in N')} n = {counted(n, 'reading')}."
-    )
+        f"return side is slack. {describe_strip('in N')} n = {counted(n, 'reading')}. "
+        f"{describe_left_out(np.concatenate([loop.left_out for loop in loops], axis=1))}"
+    ).rstrip()
 
 
 @in_paper_style
@@ -88,6 +91,7 @@ def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
         _draw_readings(axes, loop)
         _draw_slack(axes, loop)
         _draw_residuals(strip, loop)
+        draw_left_out(axes, loop.left_out)
     made.finish_strips()
     made.label("Input force (N)", "Output force (N)", "N")
     note_shown_count(made.mains[-1], len(shown), len(loops), "wrap angles")

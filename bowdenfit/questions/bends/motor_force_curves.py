@@ -38,6 +38,9 @@ def collect_motor_forces(fit: Record) -> tuple[MotorForce, ...] | None:
         points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows], fitted[rows]
         curve = path.displacement[mask], quantiles_of_draws(along[:, mask]), path.motion.stroke[mask]
         runs.append(MotorForce(label, *curve, *points))
+    if len(runs) == 1:  # else it is not known of which run they are
+        left_out = fit.dataset.measurements.excluded_points("displacement", "displacement", "force")
+        runs = [replace(runs[0], left_out=left_out)]
     return tuple(runs)
 
 

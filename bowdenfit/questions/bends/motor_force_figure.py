@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_left_out, describe_strip
 from bowdenfit.plots.curves import choose_evenly, draw_quantiles, name_band, note_shown_count
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import enlarge_marks, span
+from bowdenfit.plots.panels import draw_left_out, enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
 from bowdenfit.questions import bends as room
@@ -40,6 +40,7 @@ class MotorForce:
         points_displacement, points_force, points_stroke: Readings [mm, N].
         points_used: Whether each is used.
         points_fitted: Median of the fitted force where each was read [N].
+        left_out: Displacement and force of the readings that the user leaves out, of a single run [mm, N].
     """
 
     label: str
@@ -51,6 +52,7 @@ class MotorForce:
     points_stroke: np.ndarray
     points_used: np.ndarray
     points_fitted: np.ndarray
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 def data(fit: Record) -> tuple[MotorForce, ...] | None:
@@ -64,8 +66,8 @@ def caption(runs: tuple[MotorForce, ...]) -> str:
     return (
         f"Force at the motor against its displacement, {count_shown(shown, len(runs), 'run')}: what was read, and the "
         f"fitted loop through every turn of the motor. {describe_curve(len(runs[0].force) > 1)} {describe_strip('in N')} "
-        f"n = {counted(n, 'reading')} in {counted(len(runs), 'run')}."
-    )
+        f"n = {counted(n, 'reading')} in {counted(len(runs), 'run')}. {describe_left_out(runs[0].left_out)}"
+    ).rstrip()
 
 
 @in_paper_style
@@ -79,6 +81,7 @@ def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
         _draw_loop(axes, run)
         _draw_readings(axes, run.points_force, run)
         _draw_readings(strip, run.points_force - run.points_fitted, run)
+        draw_left_out(axes, run.left_out)
     made.finish_strips()
     made.label("Displacement at the motor (mm)", "Force at the motor (N)", "N")
     note_shown_count(made.mains[-1], len(shown), len(runs), "runs")

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from app_in_browser import faults_of, serious_findings, served, visiting
+from app_in_browser import faults_of, get_axe, serious_findings, served, visiting
 from offline_browser import browser
 
 DATASETS = Path(__file__).parents[3] / "datasets"
@@ -20,6 +20,12 @@ def chromium():
     """A browser; tests are skipped where there is none."""
     with browser() as program:
         yield program
+
+
+@pytest.fixture(scope="module")
+def axe(tmp_path_factory):
+    """The script of axe-core."""
+    return get_axe(tmp_path_factory.mktemp("axe"))
 
 
 @pytest.mark.extended

@@ -118,13 +118,31 @@ def test_the_curves_that_would_be_fitted_follow_the_angles():
         assert np.interp(length, group.x, group.series[column].values) == pytest.approx(angle, abs=3)
 
 
-@pytest.mark.parametrize("name", ["synthetic-recordings", "synthetic-haptic-loop", "synthetic-bench", "yarn-on-cylinder"])
+@pytest.mark.parametrize(
+    "name", ["synthetic-recordings", "synthetic-haptic-loop", "synthetic-bench", "yarn-on-cylinder", "synthetic-catheter"]
+)
 def test_every_kind_of_table_has_charts(name):
     pictures = make_pictures(collect_rows(DATASETS / name))
     assert pictures and all(picture.charts for picture in pictures)
     for chart in (chart for picture in pictures for chart in picture.charts):
         assert "(" in chart.x_label and "(" in chart.y_label  # with units
         assert all(np.all(np.diff(group.x) > 0) for group in chart.groups if len(group.x) and group.series[0].look == "points")
+
+
+def test_a_ring_down_is_drawn_over_the_time_from_its_release(tmp_path):
+    time = np.arange(0, 0.25, 1e-3)
+    noise = 1e-3 * np.random.default_rng(1).normal(size=len(time))
+    angle = 0.5 + 0.2 * np.exp(-8 * time) * np.cos(2 * np.pi * 22 * time) + noise
+    rows = [f"{t:.4f},{x:.6f}" for t, x in zip(time + 3, angle, strict=True)]
+    (tmp_path / "ringdown.csv").write_text("\n".join(["time_s,angle_rad", *rows, ""]))
+    table = 'ringdown = { file = "ringdown.csv", inertia = { value = 1e-3, unit = "kg*m^2" } }'
+    (tmp_path / "cable.toml").write_text(f"{describe_half_turn()}{table}\n")
+    write_rows(tmp_path, ROWS)
+    (chart,) = next(picture for picture in make_pictures(collect_rows(tmp_path)) if picture.name == "data-ringdown").charts
+    (group,) = chart.groups
+    assert chart.y_label == "Angle (deg)" and group.x[0] == 0 and group.x[-1] == pytest.approx(0.249)
+    assert group.series[0].values == pytest.approx(np.rad2deg(angle), abs=1e-3)
+    assert group.series[0].keys[0] == row_key("ringdown.csv", 2)
 
 
 def test_a_reason_is_needed(bench):

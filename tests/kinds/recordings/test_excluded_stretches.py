@@ -45,7 +45,7 @@ def test_a_fit_is_as_good_as_if_the_stretch_had_never_been(folder, tmp_path):
     assert SENTENCE in text and " by the user" in text
     fit = bf.fit(folder, mcmc=False)
     clean = bf.fit(write(BENCH, tmp_path / "clean", seed=4), mcmc=False)
-    value, expected = (one.least_squares.estimates["mu"].value for one in (fit, clean))
+    value, expected = (each_fit.least_squares.estimates["mu"].value for each_fit in (fit, clean))
     assert value == pytest.approx(expected, rel=0.01) and value == pytest.approx(0.3 / np.pi, rel=0.05)
     assert SENTENCE in " ".join(summary_text(fit).split())
     recording = fit.dataset.measurements.table(Recordings).items[0]

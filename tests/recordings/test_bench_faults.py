@@ -93,6 +93,23 @@ def test_a_rope_that_creeps_is_no_crosstalk_and_crosstalk_is_no_creep(stiffness,
     assert find_bench_fault(recording(crossed)).kind == "crosstalk"
 
 
+STIFF = (
+    (Truth(0.385, 50.0), 14.0),
+    (Truth(0.21, 52.0, damping=0.012, stribeck=0.16, stribeck_speed=9.6, viscous=0.008, reference_speed=20.0), 29.0),
+    (Truth(0.18, 14.2, damping=0.013, stribeck=0.1, stribeck_speed=10.6, reference_speed=20.0), 100.0),
+)
+
+
+@pytest.mark.parametrize(("rope", "rate"), STIFF)
+def test_a_rope_that_creeps_is_told_from_crosstalk_with_few_blocks_and_with_friction_of_another_kind(rope, rate):
+    assert find_bench_fault(record(rope, rate, 1)) is None
+
+
+def test_crosstalk_that_a_filter_makes_look_like_creep_is_named():
+    bench = replace(draw_bench(8), rate=122.0, length=200.0, mountings=1, crosstalk=0.05)
+    assert find_bench_fault(recording(bench, 8), expects_drag=True).kind == "crosstalk"
+
+
 def test_a_zero_that_drifts_is_no_jump():
     assert find_bench_fault(recording(RecordedBench(length=60, drift=0.1, rate=50))) is None
 

@@ -3,7 +3,7 @@ r"""What the channels of a recording reveal about its bench: a zero that jumps, 
 A bench with one of these faults makes a smooth loop that looks healthy, and another coefficient. So the play operator is fitted
 with and without each fault, with friction exponent, gain, drag and delay free, and the fault that explains most is taken if it
 explains far more than noise of as many independent blocks would, and matters. What changes gradually in time is fitted as well:
-a jump must explain more than a drift of a zero or a trend of friction does.
+a jump must explain more than a drift of a zero, a trend of friction, or friction that depends on speed does.
 
 For a fault with one parameter, of blocks whose deviations stay alike over :math:`\tau` of them,
 
@@ -46,6 +46,7 @@ _MATTERS: dict[FaultKind, float] = {"input_zero": 0.02, "output_zero": 0.02, "fr
 _MOVED = 0.05  # relative change of the friction exponent by a drag that is left out, from which the drag is named
 _LEAST = 1e-3  # of the typical output, below which no logarithm is taken
 _STEP = 1e-4  # of numerical slopes
+_SLOWEST = 0.01  # of the fastest change, below which friction is taken to depend on speed no more; a judgement
 _SOME_DRAG = 0.05  # of the typical output, from which a second search starts
 _EXPONENT, _CENTER, _DRAG, _DELAY, _SIZE, _SHARE = range(6)
 _USUAL = (_EXPONENT, _CENTER, _DRAG, _DELAY)
@@ -142,6 +143,13 @@ class _Loop:
     def block(self) -> float:
         """Typical time between blocks [s]."""
         return float(np.median(np.diff(self.time)))
+
+    @cached_property
+    def log_rate(self) -> Vector:
+        """Logarithm of how fast the input changes, over its median: that of the speed where a spring holds the far end."""
+        rate = np.abs(np.gradient(self.likely, self.time))
+        rate = np.log(np.maximum(rate, _SLOWEST * np.max(rate)))
+        return rate - np.median(rate)
 
     def minimum(self, start: np.ndarray, free: Sequence[int], fault: FaultKind, shape: Vector) -> tuple[np.ndarray, float]:
         """Return the parameters of the least robust cost, of which only some are free, and that cost."""
@@ -266,7 +274,7 @@ def _is_harmless_creep(loop: _Loop, usual: np.ndarray, cost: float, crosstalk: B
 
 
 def _find_jump(loop: _Loop, usual: np.ndarray, cost: float, kind: FaultKind) -> BenchFault | None:
-    """Return a jump of one kind that explains more than any gradual change does."""
+    """Return a jump of one kind that explains more than any gradual change does, and than friction that depends on speed."""
     elapsed = (loop.time - loop.time[0]) / np.ptp(loop.time)
     steps = [np.where(elapsed > place, 1.0, 0.0) for place in _PLACES]
     gains = _screen(loop, usual, kind, steps)
@@ -278,6 +286,7 @@ def _find_jump(loop: _Loop, usual: np.ndarray, cost: float, kind: FaultKind) -> 
     best = min(fits, key=lambda i: fits[i][1])
     gradual: tuple[FaultKind, ...] = ("input_zero", "output_zero", "friction")
     trends = [loop.minimum(usual, (*_USUAL, _SIZE), other, elapsed - 0.5)[1] for other in gradual]
+    trends.append(loop.minimum(usual, (*_USUAL, _SIZE), "friction", loop.log_rate)[1])
     if min(trends) < fits[best][1]:
         return None
     time = float(loop.time[0] + _PLACES[best] * np.ptp(loop.time))

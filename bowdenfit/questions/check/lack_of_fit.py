@@ -26,10 +26,13 @@ from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
+from bowdenfit.recordings.bench_faults import shows_creep
+from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, shown, significant
 
 _MAX_NAMED = 3  # departures, or readings, that are named
+_SLOW_NOISE = 0.07  # judged: slow noise over the force, from which it changes losses by percents
 _INTERVAL = 0.9  # probability of the intervals that readings are counted in
 _MAX_DELAY_ERRORS = 6.0  # standard errors of a delay; a judgement, as these errors are right to a third
 
@@ -167,8 +170,7 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     if departure.group:
         return _suggest_curve(fit, departure.group)
     if departure.against == LOAD and losses:
-        zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
-        return _suggest_friction(model, ("drag", "load-dependent"), zero)
+        return _suggest_for_load(fit, departure)
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:
@@ -194,6 +196,37 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
             "take loads and bends in random order, and leave out the readings from before it settled."
         )
     return "Look at those readings first; if they are right, this model is not that of the cable there."
+
+
+def _suggest_for_load(fit: Record, departure: Departure) -> str:
+    """Suggest what to do about losses that are no fixed share of the load."""
+    model, recordings, noise = fit.dataset.description.friction_model, fit.dataset.measurements.table(Recordings), ""
+    if recordings is not None and departure.inside:
+        is_play = not recordings.loop and not fit.model.cable.friction.counts_turns
+        if is_play and any(shows_creep(recording) for recording in recordings.items):
+            return (
+                "After its reversals the rope creeps: its friction builds up while the output moves already, and readings from "
+                "before it is there lose less. Fit again with --friction dahl."
+            )
+        noise = _describe_slow_noise(recordings, departure)
+    zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
+    return noise + _suggest_friction(model, ("drag", "load-dependent"), zero)
+
+
+def _describe_slow_noise(recordings: Recordings, departure: Departure) -> str:
+    """Describe noise of a load cell that blocks do not average out, and that is large for the lowest loads; empty without."""
+    for recording in recordings.items:
+        account = recording.account
+        for name, sd, time in zip(("input_force", "output_force"), account.sample_sd, account.noise_time, strict=True):
+            if time > 0 and sd > _SLOW_NOISE * departure.low:
+                percent = significant(100 * sd / departure.low, 2)
+                return (
+                    f"The likeliest cause is noise: that of {name} in {recording.name} is {significant(sd, 2)} N and stays "
+                    f"alike for {significant(time, 2)} s, so that averaging takes little of it, and {percent} % of the lowest "
+                    "loads, where the rope seems to slide with each of its peaks. Record with less noise (shielding, another "
+                    "amplifier) or larger loads. "
+                )
+    return ""
 
 
 def _suggest_column(fit: Record, departure: Departure) -> str:

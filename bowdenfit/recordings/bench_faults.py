@@ -41,7 +41,7 @@ _FEWEST_BLOCKS = 60  # of a recording in which a fault can be told from noise
 _PLACES = np.linspace(0.1, 0.9, 17)  # of the recording, at which a jump is looked for
 _SCREENED = 0.05  # share of the sum of squares that a fault must explain to first order to be fitted
 _CLEAR = 50.0  # F from which a fault is not taken for noise
-_SHOWN = 20.0  # F from which shorter blocks show crosstalk as well
+_SHOWN = 20.0  # F from which shorter blocks show crosstalk as well, and creep where something departs from the model
 _MATTERS: dict[FaultKind, float] = {"input_zero": 0.02, "output_zero": 0.02, "friction": 0.1, "crosstalk": 0.02}
 _MOVED = 0.05  # relative change of the friction exponent by a drag that is left out, from which the drag is named
 _LEAST = 1e-3  # of the typical output, below which no logarithm is taken
@@ -241,7 +241,7 @@ def find_bench_fault(recording: Recording, *, expects_drag: bool = False, expect
 
 
 def shows_creep(recording: Recording) -> bool:
-    """Return whether the rope of a recording clearly creeps after its reversals, rather than that its cells have crosstalk."""
+    """Return whether the rope of a recording creeps after its reversals, rather than that its cells have crosstalk."""
     loop, strokes = _thin_blocks(recording.blocks), recording.strokes
     if loop is None:
         return False
@@ -251,7 +251,7 @@ def shows_creep(recording: Recording) -> bool:
     everywhere = np.ones(len(loop.time))
     crossed = loop.minimum(usual, (*_USUAL, _SIZE), "crosstalk", everywhere)
     creep = _find_creep(loop, usual, cost, _make_fault(loop, "crosstalk", crossed, everywhere, np.nan, usual, cost))
-    return creep is not None and creep.significance > _CLEAR
+    return creep is not None and creep.significance > _SHOWN
 
 
 def _refine(recording: Recording, loop: _Loop, usual: np.ndarray, cost: float) -> tuple[_Loop, np.ndarray, float]:

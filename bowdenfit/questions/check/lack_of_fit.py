@@ -169,6 +169,8 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
+    if departure.against in (LOAD, STROKE) and losses and (creep := _describe_creep(fit, departure)):
+        return creep
     if departure.against == LOAD and losses:
         return _suggest_for_load(fit, departure)
     if departure.against == SPEED and losses:
@@ -200,17 +202,23 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
 
 def _suggest_for_load(fit: Record, departure: Departure) -> str:
     """Suggest what to do about losses that are no fixed share of the load."""
-    model, recordings, noise = fit.dataset.description.friction_model, fit.dataset.measurements.table(Recordings), ""
-    if recordings is not None and departure.inside:
-        is_play = not recordings.loop and not fit.model.cable.friction.counts_turns
-        if is_play and any(shows_creep(recording) for recording in recordings.items):
-            return (
-                "After its reversals the rope creeps: its friction builds up while the output moves already, and readings from "
-                "before it is there lose less. Fit again with --friction dahl."
-            )
-        noise = _describe_slow_noise(recordings, departure)
+    model, recordings = fit.dataset.description.friction_model, fit.dataset.measurements.table(Recordings)
+    noise = _describe_slow_noise(recordings, departure) if recordings is not None and departure.inside else ""
     zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
     return noise + _suggest_friction(model, ("drag", "load-dependent"), zero)
+
+
+def _describe_creep(fit: Record, departure: Departure) -> str:
+    """Describe a rope that creeps in recordings whose model lets friction hold at once; empty where none does."""
+    recordings = fit.dataset.measurements.table(Recordings)
+    if recordings is None or recordings.loop or not departure.inside or fit.model.cable.friction.counts_turns:
+        return ""
+    if not any(shows_creep(recording) for recording in recordings.items):
+        return ""
+    return (
+        "After its reversals the rope creeps: its friction builds up while the output moves already, and readings from before "
+        "it is there lose less. Fit again with --friction dahl."
+    )
 
 
 def _describe_slow_noise(recordings: Recordings, departure: Departure) -> str:

@@ -26,13 +26,11 @@ from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
-from bowdenfit.recordings.bench_faults import shows_creep
-from bowdenfit.recordings.recording import Recordings
+from bowdenfit.questions.recorded.causes_of_departures import describe_creep, describe_slow_noise
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, shown, significant
 
 _MAX_NAMED = 3  # departures, or readings, that are named
-_SLOW_NOISE = 0.07  # judged: slow noise over the force, from which it changes losses by percents
 _INTERVAL = 0.9  # probability of the intervals that readings are counted in
 _MAX_DELAY_ERRORS = 6.0  # standard errors of a delay; a judgement, as these errors are right to a third
 
@@ -169,10 +167,11 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
-    if departure.against in (LOAD, STROKE) and losses and (creep := _describe_creep(fit, departure)):
+    if departure.against in (LOAD, STROKE) and losses and (creep := describe_creep(fit, departure)):
         return creep
     if departure.against == LOAD and losses:
-        return _suggest_for_load(fit, departure)
+        zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
+        return describe_slow_noise(fit, departure) + _suggest_friction(model, ("drag", "load-dependent"), zero)
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:
@@ -198,43 +197,6 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
             "take loads and bends in random order, and leave out the readings from before it settled."
         )
     return "Look at those readings first; if they are right, this model is not that of the cable there."
-
-
-def _suggest_for_load(fit: Record, departure: Departure) -> str:
-    """Suggest what to do about losses that are no fixed share of the load."""
-    model, recordings = fit.dataset.description.friction_model, fit.dataset.measurements.table(Recordings)
-    noise = _describe_slow_noise(recordings, departure) if recordings is not None and departure.inside else ""
-    zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
-    return noise + _suggest_friction(model, ("drag", "load-dependent"), zero)
-
-
-def _describe_creep(fit: Record, departure: Departure) -> str:
-    """Describe a rope that creeps in recordings whose model lets friction hold at once; empty where none does."""
-    recordings = fit.dataset.measurements.table(Recordings)
-    if recordings is None or recordings.loop or not departure.inside or fit.model.cable.friction.counts_turns:
-        return ""
-    if not any(shows_creep(recording) for recording in recordings.items):
-        return ""
-    return (
-        "After its reversals the rope creeps: its friction builds up while the output moves already, and readings from before "
-        "it is there lose less. Fit again with --friction dahl."
-    )
-
-
-def _describe_slow_noise(recordings: Recordings, departure: Departure) -> str:
-    """Describe noise of a load cell that blocks do not average out, and that is large for the lowest loads; empty without."""
-    for recording in recordings.items:
-        account = recording.account
-        for name, sd, time in zip(("input_force", "output_force"), account.sample_sd, account.noise_time, strict=True):
-            if time > 0 and sd > _SLOW_NOISE * departure.low:
-                percent = significant(100 * sd / departure.low, 2)
-                return (
-                    f"The likeliest cause is noise: that of {name} in {recording.name} is {significant(sd, 2)} N and stays "
-                    f"alike for {significant(time, 2)} s, so that averaging takes little of it, and {percent} % of the lowest "
-                    "loads, where the rope seems to slide with each of its peaks. Record with less noise (shielding, another "
-                    "amplifier) or larger loads. "
-                )
-    return ""
 
 
 def _suggest_column(fit: Record, departure: Departure) -> str:

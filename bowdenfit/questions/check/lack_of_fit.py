@@ -167,11 +167,12 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
-    if departure.against in (LOAD, STROKE) and losses and (creep := describe_creep(fit, departure)):
+    noise = describe_slow_noise(fit, departure) if departure.against == LOAD and losses else ""
+    if departure.against in (LOAD, STROKE) and losses and not noise and (creep := describe_creep(fit, departure)):
         return creep
     if departure.against == LOAD and losses:
         zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
-        return describe_slow_noise(fit, departure) + _suggest_friction(model, ("drag", "load-dependent"), zero)
+        return noise + _suggest_friction(model, ("drag", "load-dependent"), zero)
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:

@@ -226,7 +226,10 @@ def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterato
                 continue
             for columns in _departure_columns(against, x, selected, bool(group), against in readings.unused):
                 lever = np.ones(len(x)) if against == ZERO else readings.lever
-                tested = _test_columns(system, readings, np.where(selected[:, None], columns, 0.0) * lever[:, None])
+                by_speed = _speed_columns(readings, selected) if against == ORDER else np.zeros((len(x), 0))
+                columns = np.hstack([columns, by_speed])
+                scaled = np.where(selected[:, None], columns, 0.0) * lever[:, None]
+                tested = _test_columns(system, readings, scaled, by_speed.shape[1])
                 if tested is not None:
                     yield Departure(
                         readings.table,
@@ -289,6 +292,18 @@ def _derive_by_departures(posterior: LogDensity, solution: Solution, tested: Seq
     return dict(zip(tested, np.moveaxis(np.asarray(program(none, posterior.data)), 1, 0), strict=True))
 
 
+def _speed_columns(readings: ResidualGroup, selected: np.ndarray) -> np.ndarray:
+    """Return columns of friction that depends on the speed, which must not pass for a drift where the order goes by speed.
+
+    Friction of Stribeck falls and rises again: the logarithm of the speed and its square.
+    """
+    speed = readings.at.get(SPEED)
+    if speed is None or not np.all(np.isfinite(speed[selected])) or np.ptp(speed[selected]) == 0:
+        return np.zeros((len(selected), 0))
+    log = next(_departure_columns(SPEED, speed, selected, False, False))[:, 0]
+    return np.stack([log, log**2], axis=1)
+
+
 def _departure_columns(
     against: str, x: np.ndarray, selected: np.ndarray, of_curve: bool, is_unused: bool
 ) -> Iterator[np.ndarray]:
@@ -315,12 +330,26 @@ def _departure_columns(
         yield np.polynomial.legendre.legvander(np.where(selected, 2 * (x - low) / (high - low) - 1, 0.0), degree)
 
 
-def _test_columns(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray) -> tuple[float, float] | None:
-    """Return the p-value of a departure and its size; None where it cannot be tested."""
+def _test_columns(
+    system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray, n_given: int = 0
+) -> tuple[float, float] | None:
+    """Return the p-value of a departure and its size; None where it cannot be tested.
+
+    Args:
+        system: Residuals of all readings.
+        readings: Those of one table.
+        columns: The departure, (reading, column).
+        n_given: How many columns at the end explain what they can before it.
+    """
     whole = np.zeros((len(system.residuals), columns.shape[1]))
     whole[readings.rows] = columns / (readings.unit * readings.scatter)[:, None]
     whole /= np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-    u, s, _ = np.linalg.svd(whole - system.followed @ (system.followed.T @ whole), full_matrices=False)
+    whole -= system.followed @ (system.followed.T @ whole)
+    if n_given:
+        explained, sizes, _ = np.linalg.svd(whole[:, -n_given:], full_matrices=False)
+        explained = explained[:, sizes > _FOLLOWED]
+        whole = whole[:, :-n_given] - explained @ (explained.T @ whole[:, :-n_given])
+    u, s, _ = np.linalg.svd(whole, full_matrices=False)
     u = u[:, s > _FOLLOWED]
     along, k, part = u.T @ system.residuals, u.shape[1], u[readings.rows]
     freedom = readings.freedom - float(np.sum(part**2))  # the parameters carry some of a departure to other tables

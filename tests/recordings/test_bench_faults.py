@@ -12,7 +12,7 @@ from recorded_benches import RecordedBench, channels, draw_bench, write
 
 import bowdenfit as bf
 from bowdenfit.description import Preparation
-from bowdenfit.recordings.bench_faults import describe_bench_fault, find_bench_fault
+from bowdenfit.recordings.bench_faults import describe_bench_fault, find_bench_fault, shows_creep
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import RawRecording, Recording
 from bowdenfit.recordings.strokes import find_strokes
@@ -91,6 +91,43 @@ def test_a_rope_that_creeps_is_no_crosstalk_and_crosstalk_is_no_creep(stiffness,
     assert find_bench_fault(record(Truth(exponent, stiffness), 100.0, 1)) is None
     crossed = RecordedBench(length=60, rate=50, wave="sine", load=1.0, crosstalk=0.05, noise=0.001)
     assert find_bench_fault(recording(crossed)).kind == "crosstalk"
+
+
+STIFF = (
+    (Truth(0.385, 50.0), 14.0),
+    (Truth(0.21, 52.0, damping=0.012, stribeck=0.16, stribeck_speed=9.6, viscous=0.008, reference_speed=20.0), 29.0),
+    (Truth(0.18, 14.2, damping=0.013, stribeck=0.1, stribeck_speed=10.6, reference_speed=20.0), 100.0),
+)
+
+
+@pytest.mark.parametrize(("rope", "rate"), STIFF)
+def test_a_rope_that_creeps_is_told_from_crosstalk_with_few_blocks_and_with_friction_of_another_kind(rope, rate):
+    assert find_bench_fault(record(rope, rate, 1)) is None
+
+
+def test_crosstalk_that_a_filter_makes_look_like_creep_is_named():
+    bench = replace(draw_bench(8), rate=122.0, length=200.0, mountings=1, crosstalk=0.05)
+    assert find_bench_fault(recording(bench, 8), expects_drag=True).kind == "crosstalk"
+
+
+def test_friction_that_falls_with_the_speed_is_no_friction_that_changes_half_way():
+    """The strokes of this rope become faster in the course of the recording."""
+    rope = Truth(0.41, 42.0, damping=0.007, stribeck=0.47, stribeck_speed=5.2, viscous=-0.001, reference_speed=20.0)
+    assert find_bench_fault(record(rope, 168.0, 1)) is None
+
+
+def test_a_rope_that_creeps_shows_it_and_a_bench_with_or_without_crosstalk_does_not():
+    assert shows_creep(record(Truth(0.22, 13.0), 100.0, 1))
+    for crosstalk in (0.0, 0.05):
+        assert not shows_creep(recording(RecordedBench(length=60, rate=200, wave="sine", crosstalk=crosstalk)))
+
+
+@pytest.mark.extended
+def test_noise_that_blocks_do_not_average_out_is_named_and_the_same_bench_with_less_is_trusted(tmp_path):
+    bench = RecordedBench(rate=170, length=166, period=5.72, exponent=0.6, noise=0.03, correlated=0.1, mountings=3)
+    noisy = bf.fit(write(bench, tmp_path / "noisy", 48), mcmc=False, seed=1).verdict()
+    assert any("likeliest cause is noise: that of input_force in m0" in reason for reason in noisy.reasons)
+    assert bf.fit(write(replace(bench, noise=0.01), tmp_path / "quiet", 48), mcmc=False, seed=1).verdict().trusted
 
 
 def test_a_zero_that_drifts_is_no_jump():

@@ -26,6 +26,7 @@ from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
+from bowdenfit.questions.recorded.causes_of_departures import describe_creep, describe_slow_noise
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, shown, significant
 
@@ -166,9 +167,12 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
+    noise = describe_slow_noise(fit, departure) if departure.against == LOAD and losses else ""
+    if departure.against in (LOAD, STROKE) and losses and not noise and (creep := describe_creep(fit, departure)):
+        return creep
     if departure.against == LOAD and losses:
         zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
-        return _suggest_friction(model, ("drag", "load-dependent"), zero)
+        return noise + _suggest_friction(model, ("drag", "load-dependent"), zero)
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:

@@ -106,22 +106,22 @@ def flag_samples(
 def _skipped(force: Vector) -> Flags:
     """Return samples that are exactly 0 between samples far above it, as a multiplexer or a loose plug writes them.
 
-    The lowest reading stands for 0 where that is not 0 but repeated: a channel may have been tared. Zeros that last for more
-    than a few samples are those of a slack rope unless the force falls to them faster than it moves.
+    The lowest reading stands for 0 if it is far below the others and repeated: a channel may have been tared. Zeros that last
+    for more than a few samples are those of a slack rope unless the force falls to them faster than it moves.
     """
     some = subsample(force)
-    lowest = float(np.nanmin(some)) if np.any(np.isfinite(some)) else 0.0
+    loaded = _LOADED * float(np.nanmedian(some[some > 0])) if np.any(some > 0) else np.inf
+    lowest = min(float(np.nanmin(some)), loaded) if np.any(np.isfinite(some)) else 0.0
     zero = (force == 0) | (force == lowest)
     if np.count_nonzero(zero) < 2:
         return np.zeros(len(force), dtype=bool)
-    loaded = force > _LOADED * float(np.nanmedian(some[some > 0])) if np.any(some > 0) else zero
     edges = np.diff(zero.astype(np.int8), prepend=0, append=0)
     start, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     inside = (start > 0) & (end < len(force))
     start, end = start[inside], end[inside]
     steps = np.abs(np.diff(some[(some != 0) & (some != lowest)]))
     fall = _SUDDEN * float(np.nanquantile(steps, 0.99)) if len(steps) else 0.0
-    sudden = loaded[start - 1] & loaded[end]
+    sudden = (force[start - 1] > loaded) & (force[end] > loaded)
     sudden &= (end - start <= _LONGEST_SPIKE) | (np.minimum(force[start - 1], force[end]) > fall)
     return _from_to(start[sudden], end[sudden], len(force))
 

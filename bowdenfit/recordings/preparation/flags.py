@@ -106,12 +106,14 @@ def flag_samples(
 def _skipped(force: Vector) -> Flags:
     """Return samples that are exactly 0 between samples far above it, as a multiplexer or a loose plug writes them.
 
-    The lowest reading stands for 0 if it is far below the others and repeated: a channel may have been tared. Zeros that last
-    for more than a few samples are those of a slack rope unless the force falls to them faster than it moves.
+    The lowest reading stands for 0 if it is far below the others and repeated: a channel may have been tared, though by no more
+    than it reads; what is lower still is a code. Zeros that last for more than a few samples are those of a slack rope unless
+    the force falls to them faster than it moves.
     """
     some = subsample(force)
     loaded = _LOADED * float(np.nanmedian(some[some > 0])) if np.any(some > 0) else np.inf
     lowest = min(float(np.nanmin(some)), loaded) if np.any(np.isfinite(some)) else 0.0
+    lowest = lowest if lowest > -float(np.nanmax(some, initial=0.0)) else 0.0
     zero = (force == 0) | (force == lowest)
     if np.count_nonzero(zero) < 2:
         return np.zeros(len(force), dtype=bool)

@@ -49,6 +49,7 @@ def serve_app(
         workbench = Workbench(folder, scratch)
         application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         register_pages(workbench, application)
+        nicegui_app.config.quasar_config["loadingBar"]["skipHijack"] = True  # a bar that nothing tells screen readers about
         ui.run_with(
             application, title="bowdenfit", dark=None, language="en-US", tailwind=False, show_welcome_message=False,
             reconnect_timeout=60.0,  # s; JAX loads slowly on a busy machine

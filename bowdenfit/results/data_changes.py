@@ -1,11 +1,10 @@
 """Whether the data of a fit are still as they were fitted.
 
-Checksums of the files are in fit.json, with the folder of the data set as it is seen from the results folder. A results folder
-may come from anybody, so that this is a hint: only what is below the working folder, or below the folder that holds the
-results, is compared, and nothing is reported of a data set that is not there.
+Checksums of the files are in fit.json, with the path of the data set below the folder that holds the results; no path leads
+out of it. A results folder may come from anybody, so that this is a hint: only what is below that folder is compared, and
+nothing is reported of a data set that is not there.
 """
 
-import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -49,7 +48,7 @@ class DataChanges:
 
 
 def locate_data_set(folder: Path | None, results: Path) -> dict[str, str]:
-    """Return what fit.json says of where the data set is: its folder as seen from the results folder.
+    """Return what fit.json says of where the data set is; nothing of one that is elsewhere.
 
     A folder in which it would not be looked for is not said.
 
@@ -57,18 +56,15 @@ def locate_data_set(folder: Path | None, results: Path) -> dict[str, str]:
         folder: Folder of the data set; None without one.
         results: The results folder.
     """
-    if folder is None or not folder.is_dir() or not _is_near(folder.resolve(), results.resolve()):
-        return {}  # a data frame, for one, was read from a folder that is gone
-    return {DATA_SET: Path(os.path.relpath(folder.resolve(), results.resolve())).as_posix()}
-
-
-def _is_near(folder: Path, results: Path) -> bool:
-    """Whether a folder is below the working folder, or below the one that holds the results."""
-    return any(folder.is_relative_to(place) for place in (_folder_above(results), Path.cwd().resolve()))
+    if folder is None or not folder.is_dir():  # a data frame, for one, was read from a folder that is gone
+        return {}
+    above = _folder_above(results.resolve())
+    is_below = folder.resolve().is_relative_to(above)
+    return {DATA_SET: folder.resolve().relative_to(above).as_posix()} if is_below else {}
 
 
 def _folder_above(results: Path) -> Path:
-    """Return the folder next to whose data sets a results folder usually is."""
+    """Return the folder below which the data set of a results folder is looked for."""
     return results.parent.parent if results.parent.name == _USUAL_FOLDER else results.parent
 
 
@@ -102,10 +98,10 @@ def _find_data_set(
     folder = results.resolve()
     above = _folder_above(folder)
     if isinstance(page.get(DATA_SET), str):
-        stated = (folder / page[DATA_SET]).resolve()
+        data_set = (above / page[DATA_SET]).resolve()
         expected = [_DESCRIPTION] if _DESCRIPTION in checksums else checksums
-        if _is_near(stated, folder) and any((stated / name).exists() for name in expected):
-            return stated
+        if data_set.is_relative_to(above) and any((data_set / name).exists() for name in expected):
+            return data_set
     if _DESCRIPTION not in checksums:
         return None
     candidates = [path for path in (above, *above.iterdir()) if (path / _DESCRIPTION).is_file()]
@@ -133,7 +129,7 @@ def _list_new_files(folder: Path, checksums: Mapping[str, str]) -> Iterator[str]
     _, description = read_toml_file(folder / _DESCRIPTION)
     tables = description.get("tables", {})
     patterns = [settings["files"] for settings in tables.values() if isinstance(settings, dict) and "files" in settings]
-    for pattern in (part for stated in patterns for part in ([stated] if isinstance(stated, str) else stated)):
+    for pattern in (part for parts in patterns for part in ([parts] if isinstance(parts, str) else parts)):
         for path in match_files(folder, pattern):
             name = path.relative_to(folder).as_posix()
             if not {name, path.name} & {*checksums}:

@@ -142,6 +142,23 @@ def quick_results(finished) -> Path:
     return finished[1]
 
 
+@pytest.fixture(scope="module")
+def chromium():
+    """One browser for all tests of a file, which are skipped where there is none."""
+    from offline_browser import browser
+
+    with browser() as program:
+        yield program
+
+
+@pytest.fixture(scope="module")
+def axe(tmp_path_factory):
+    """The script of axe-core."""
+    from app_in_browser import get_axe
+
+    return get_axe(tmp_path_factory.mktemp("axe"))
+
+
 @pytest.fixture(scope="session")
 def loop_results(on_body, tmp_path_factory) -> Path:
     """The folder of a quick fit of the synthetic loop, without figures; no test changes it."""

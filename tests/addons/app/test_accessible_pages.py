@@ -4,8 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from app_in_browser import faults_of, get_axe, serious_findings, served, visiting
-from offline_browser import browser
+from app_in_browser import faults_of, serious_findings, served, visiting
 
 DATASETS = Path(__file__).parents[3] / "datasets"
 _FOCUS = """() => {
@@ -13,19 +12,6 @@ _FOCUS = """() => {
   const isSeen = focused === document.body || (style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1);
   return [focused.innerText || focused.getAttribute("aria-label") || focused.labels?.[0]?.innerText || focused.tagName, isSeen];
 }"""
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory):
-    """The script of axe-core."""
-    return get_axe(tmp_path_factory.mktemp("axe"))
 
 
 @pytest.mark.extended

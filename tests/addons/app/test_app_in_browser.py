@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from app_in_browser import served, visiting
 from half_turn_bench import describe_half_turn
-from offline_browser import browser
 
 import bowdenfit as bf
 
@@ -25,13 +24,6 @@ PASTE = """(cell, words) => {
   cell.dispatchEvent(new ClipboardEvent("paste", { clipboardData: data, bubbles: true, cancelable: true }));
 }"""
 TABLE = "\n".join(["F_in (N),F_out (N),run", *ROWS, ""])
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import sys
 import pytest
 from app_in_browser import faults_of, served, visiting, watch
 from half_turn_bench import describe_half_turn
-from offline_browser import browser
 
 import bowdenfit as bf
 
@@ -18,13 +17,6 @@ target_ess = 200
 target_r_hat = 1.05
 max_steps = 4000
 """
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
 
 
 def write_bench(folder, share, runs=5):

@@ -5,16 +5,8 @@ import tomllib
 import pytest
 from app_in_browser import faults_of, served, visiting
 from half_turn_bench import TABLE, describe_half_turn
-from offline_browser import browser
 
 pytestmark = pytest.mark.extended
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])

@@ -3,19 +3,11 @@
 import pytest
 from app_in_browser import faults_of, served, visiting
 from half_turn_bench import describe_half_turn
-from offline_browser import browser
 
 import bowdenfit as bf
 
 ROWS = "input_force_N,output_force_N,run\n20,15.2,1\n40,30.1,1\n60,45.6,1\n20,15.0,2\n40,30.9,2\n60,46.0,2\n"
 pytestmark = pytest.mark.extended
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
 
 
 def click_at(page, figure, x):

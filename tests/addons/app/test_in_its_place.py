@@ -5,27 +5,13 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from app_in_browser import faults_of, get_axe, serious_findings, served, visiting
+from app_in_browser import faults_of, serious_findings, served, visiting
 from half_turn_bench import describe_half_turn
-from offline_browser import browser
 from recorded_benches import RecordedBench, write
 
 DATASETS = Path(__file__).parents[3] / "datasets"
 pytestmark = pytest.mark.extended
 LOOKS = [(1280, "light"), (1280, "dark"), (390, "light"), (390, "dark")]
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory):
-    """The script of axe-core."""
-    return get_axe(tmp_path_factory.mktemp("axe"))
 
 
 @pytest.fixture

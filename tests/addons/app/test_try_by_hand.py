@@ -7,20 +7,12 @@ import jax
 import numpy as np
 import pytest
 from app_in_browser import faults_of, served, visiting
-from offline_browser import browser
 
 import bowdenfit as bf
 from bowdenfit.addons.app.trial import TrialModel
 
 DATASETS = Path(__file__).parents[3] / "datasets"
 YARN = DATASETS / "yarn-on-cylinder"
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; tests are skipped where there is none."""
-    with browser() as program:
-        yield program
 
 
 def test_the_misfit_and_the_curve_are_those_of_the_model():

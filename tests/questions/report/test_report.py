@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from offline_browser import browser, opened
+from offline_browser import opened
 
 import bowdenfit as bf
 from bowdenfit.pages.page import MOST_BYTES
@@ -22,13 +22,6 @@ SHEETS = 6
 CHART = "#figure-{} .chart"
 HOSTILE = """</title><script>alert(1)</script><img src=x onerror=alert(2)>"' ]]> &lt; {{7*7}}"""
 LONGER = f"{HOSTILE}\n\u202egnp.exe"  # which no description may hold, but a folder that was edited
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """One browser for all tests of this file."""
-    with browser() as running_browser:
-        yield running_browser
 
 
 @pytest.fixture(scope="module")

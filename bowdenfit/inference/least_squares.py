@@ -166,20 +166,20 @@ def read_start(space: ParameterSpace, values: Mapping[str, float]) -> np.ndarray
     z = np.array([_starting_z(parameter)[0] for parameter in space.free])
     for name, value in values.items():
         if name not in space.index:
-            why = "is fixed" if name in {p.name for p in space.fixed} else "is not a parameter of this fit"
-            raise UsageError(f"start: {shown(name)} {why}{suggest_name(name, list(space.index))}")
+            fault = "is fixed" if name in {p.name for p in space.fixed} else "is not a parameter of this fit"
+            raise UsageError(f"start: {shown(name)} {fault}{suggest_name(name, list(space.index))}")
         parameter = space.free[space.index[name]]
         if parameter.role == "noise":
             raise UsageError(f"start: {name} is the size of the noise, which the search holds; leave it out.")
-        at = z_at(parameter.prior, value / parameter.shown_scale)
-        if not abs(at) <= FARTHEST:
+        z_value = z_at(parameter.prior, value / parameter.shown_scale)
+        if not abs(z_value) <= FARTHEST:
             low, high = (value_at(parameter.prior, end) * parameter.shown_scale for end in (-FARTHEST, FARTHEST))
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             raise UsageError(
                 f"start: {name} = {value:g}{unit} is outside of what its prior ({parameter.prior_text}) allows, "
                 f"{low:.3g} to {high:.3g}{unit}; start from a value in between, or state another prior."
             )
-        z[space.index[name]] = at
+        z[space.index[name]] = z_value
     return z if values else None
 
 

@@ -217,8 +217,8 @@ def _fit_text(page: Mapping[str, Any], measurements: Measurements) -> str:
 
 def _measurements_page(measurements: Measurements) -> dict[str, Any]:
     tables = {kind.name: table for kind, table in iterate_tables(measurements)}
-    others = {"remarks": measurements.remarks, EXCLUDED: measurements.excluded}
-    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, **others})
+    besides = {"remarks": measurements.remarks, EXCLUDED: measurements.excluded}
+    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, **besides})
     return page
 
 

@@ -114,9 +114,10 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     _show_questions(workbench, draft, understanding, look_again)
     if not understanding.description:
         return
+    warnings = sort_warnings(understanding.checked) if understanding.checked is not None else {}
     with section("What it means", "understood"):
         if understanding.checked is not None:
-            show_checked(understanding.checked)
+            show_checked(understanding.checked, warnings)
         place = block("div")
         with block("details"):
             text("The cable.toml that is written", "summary")
@@ -124,7 +125,6 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     if understanding.checked is not None:
         _show_writing(workbench, draft)
     with place:
-        warnings = sort_warnings(understanding.checked) if understanding.checked is not None else {}
         await MeasuredView(workbench, draft.folder).show(understanding.refusals, warnings)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
-from html import escape
 from types import MappingProxyType
 from typing import Any
 
@@ -13,12 +12,9 @@ from bowdenfit.addons.app.elements import block, markup, text
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.cable.registry import CURVES, load_class
 from bowdenfit.description import Route
+from bowdenfit.questions.start.cable_layout import CURVE_SHAPES
 
 _WIDTH, _HEIGHT, _EDGE, _POINTS = 72, 40, 3, 41  # of a picture, in its own units
-_WORDS = {
-    "gaussian": "a bell, largest at some length", "line": "a straight line", "logistic": "from 0 to a plateau",
-    "smooth": "no known family",
-}  # fmt: skip
 _VALUE = "event => emit(event.target.value)"
 
 
@@ -26,17 +22,17 @@ _VALUE = "event => emit(event.target.value)"
 def draw_curve_pictures() -> Mapping[str, str]:
     """Return an SVG of each family that has an example, as its own formula gives it; loads JAX."""
     route, pictures = Route(variable="length", unit="mm", range=(-1.0, 1.0)), dict[str, str]()
-    at = np.linspace(-1, 1, _POINTS)
+    lengths = np.linspace(-1, 1, _POINTS)
     for name, family in CURVES.items():
         curve = load_class(family.place)("angle", route)
         if curve.example:
-            pictures[name] = _draw(at, np.asarray(curve.at(at, *curve.example), dtype=float))
+            pictures[name] = _draw(lengths, np.asarray(curve.at(lengths, *curve.example), dtype=float))
     return MappingProxyType(pictures)
 
 
-def _draw(at: np.ndarray, angle: np.ndarray) -> str:
+def _draw(length: np.ndarray, angle: np.ndarray) -> str:
     """Return a line above an axis."""
-    across = _EDGE + (at + 1) / 2 * (_WIDTH - 2 * _EDGE)
+    across = _EDGE + (length + 1) / 2 * (_WIDTH - 2 * _EDGE)
     up = _HEIGHT - _EDGE - angle / angle.max() * (_HEIGHT - 2 * _EDGE)
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, up, strict=True))
     axes = f'<path d="M{_EDGE} {_EDGE}V{_HEIGHT - _EDGE}H{_WIDTH - _EDGE}"/>'
@@ -72,8 +68,8 @@ def show_curve_menu(
                 places[option] = markup("", "span", "picture")
                 with block("span"):
                     text(words, "span", "name")
-                    if about := _WORDS.get(option, ""):
-                        text(escape(about), "span", "hint")
+                    if shape := CURVE_SHAPES.get(option, ""):
+                        text(shape, "span", "hint")
 
     async def draw() -> None:
         for option, picture in (await workbench.compute(draw_curve_pictures)).items():

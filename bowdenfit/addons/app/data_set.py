@@ -139,11 +139,12 @@ class DataSetPage:
             error = caught
         self._place.clear()
         with self._place:
+            warnings = sort_warnings(report) if report is not None else {}
             if report is not None:
-                show_checked(report)
+                show_checked(report, warnings)
             elif error is not None:
                 refused(str(error))
-            refusals, warnings = list_refusals(error) if error else (), sort_warnings(report) if report else {}
+            refusals = list_refusals(error) if error else ()
             await MeasuredView(self._workbench, folder, self._change_row).show(refusals, warnings)
 
     async def _change_row(self, kind: str, file: str, row: int, reason: str | None) -> None:

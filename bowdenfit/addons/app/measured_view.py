@@ -142,9 +142,9 @@ def sort_warnings(report: "Report") -> Warnings:
     files = {kind.name: getattr(getattr(table, "origin", None), "files", ()) for kind, table in tables}
     by_kind: dict[str, list[str]] = {}
     for warning in report.warnings:
-        own = [kind for kind in of_kinds if warning in of_kinds[kind]]
+        about = [kind for kind in of_kinds if warning in of_kinds[kind]]
         named = [kind for kind in files if any(file in warning for file in files[kind])]
-        by_kind.setdefault(next(iter([*own, *named]), ""), []).append(warning)
+        by_kind.setdefault(next(iter([*about, *named]), ""), []).append(warning)
     return by_kind
 
 
@@ -154,9 +154,8 @@ def _show_warning(warning: str) -> None:
         text(page_words(f"Warning: {warning}"))
 
 
-def show_checked(report: "Report") -> None:
+def show_checked(report: "Report", warnings: Warnings) -> None:
     """Show what was understood of a data set, and the way to each warning; all that the command line prints on request."""
-    warnings = sort_warnings(report)
     for warning in warnings.get("", ()):
         _show_warning(warning)
     if located := {kind: sentences for kind, sentences in warnings.items() if kind}:

@@ -35,6 +35,10 @@ from bowdenfit.questions.start.question import (
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import listed, quoted, shown
 
+CURVE_SHAPES = {  # of the families that are proposed
+    "gaussian": "a bell, largest at some length", "line": "a straight line", "logistic": "from 0 to a plateau",
+    "smooth": "no known curve",
+}  # fmt: skip
 _WRAP_ANGLE, _LENGTH = "wrap_angle", "cable_length"  # columns of tables where headings give no name of their own
 _ANGLE_WORDS = re.compile(
     r"\b(?:wrap|bend|angles?|winkel|umschlingungswinkel|biegewinkel|angulo|angolo)\b|_", re.IGNORECASE
@@ -157,16 +161,17 @@ def _choices_question(ends: Sequence[float], unit: str) -> Question[tuple[float,
 
 def _ask_curve(layout: CableLayout, length: FileColumn, angle: FileColumn, asker: Asker) -> str:
     """Return the curve that an angle follows along the length, as answered."""
-    shape = (
-        "How does that angle follow the length: gaussian (a bell, largest at some length), line (a straight line), "
-        "logistic (from 0 to a plateau) or smooth (no known curve)? bowdenfit compare says whether another fits better."
+    *shapes, last = (f"{name} ({shape})" for name, shape in CURVE_SHAPES.items())
+    question = (
+        f"How does that angle follow the length: {', '.join(shapes)} or {last}? bowdenfit compare says whether another fits "
+        "better."
     )
     route = Route(variable=layout.route["variable"], unit=layout.route["unit"], range=tuple(layout.route["range"]))
     has_length, radians = np.isfinite(length.values), conversion_factor(angle.unit, "angle", "rad")
     proposed = propose_curve(route, length.values[has_length], radians * angle.values[has_length])
     if proposed == NO_FAMILY:
         asker.say(f"Another curve than a bell predicts each angle of {shown(angle.name)} better from the rest.")
-    return asker.ask(word_question(shape, sorted(CURVES), proposed))
+    return asker.ask(word_question(question, sorted(CURVES), proposed))
 
 
 def _add_curved_contacts(file: MeasuredFile, length: FileColumn, layout: CableLayout, asker: Asker) -> None:

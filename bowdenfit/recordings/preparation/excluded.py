@@ -56,12 +56,12 @@ def collect_flagged(common: CommonClock, raw: RawRecording, delay: float) -> Fla
     for kind in range(GOOD + 1, NO_OVERLAP):
         positions = np.flatnonzero(common.fault == kind)
         chosen.append(positions[np.unique(np.linspace(0, len(positions) - 1, min(len(positions), _SHOWN_FLAGS)).astype(int))])
-    at = np.sort(np.concatenate(chosen))
-    time, inputs, outputs = common.time[at], common.input_force[at], common.output_force[at]
+    samples = np.sort(np.concatenate(chosen))
+    time, inputs, outputs = common.time[samples], common.input_force[samples], common.output_force[samples]
     if raw.excluded is not None:
-        is_excluded = common.fault[at] == EXCLUDED
+        is_excluded = common.fault[samples] == EXCLUDED
         as_read = np.interp(time, raw.input_time, raw.excluded.input_force)
         inputs = np.where(is_excluded, as_read, inputs)
         as_read = np.interp(time + delay, raw.output_time, raw.excluded.output_force)
         outputs = np.where(is_excluded, as_read, outputs)
-    return FlaggedSamples(tuple(KINDS[k] for k in common.fault[at].tolist()), time, inputs, outputs)
+    return FlaggedSamples(tuple(KINDS[k] for k in common.fault[samples].tolist()), time, inputs, outputs)

@@ -171,10 +171,10 @@ def _drop_after_holes(is_x: np.ndarray, period: float) -> np.ndarray:
     """
     edges = np.diff(is_x, prepend=1.0, append=1.0)
     begins, ends = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
-    kept = is_x.copy()
+    weights = is_x.copy()
     for end in ends[ends - begins > _HOLE * period]:
-        kept[end : end + int(np.ceil(period))] = 0.0
-    return kept
+        weights[end : end + int(np.ceil(period))] = 0.0
+    return weights
 
 
 def _average(time: OtherVector, force: OtherVector, good: ChosenFlags | None, step: float) -> tuple[Vector, Vector]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from bowdenfit.arguments import Quantity, number_with_unit
 from bowdenfit.display import Block, Rows, blocks_of
 from bowdenfit.errors import UsageError, suggest_name
+from bowdenfit.inference.interval import Interval
 from bowdenfit.questions import identify
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
 from bowdenfit.questions.bends.words import elastic_blocks
@@ -16,7 +17,13 @@ from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.questions.check.words import check_sentences
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.words import comparison_blocks
-from bowdenfit.questions.error_budget import ErrorBudget, error_budget, find_optimal_length, with_bench_errors
+from bowdenfit.questions.error_budget import (
+    ErrorBudget,
+    answer_interval,
+    error_budget,
+    find_optimal_length,
+    with_bench_errors,
+)
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,
@@ -115,6 +122,14 @@ class Fit(Record):
             UsageError: The fit has no draws.
         """
         return make_data_tree(self)
+
+    def parameter(self, name: str) -> Interval:
+        """Return a parameter's value and interval, which includes the errors of the bench, in the unit in which it is shown.
+
+        Raises:
+            UsageError: There is no such parameter, or no posterior.
+        """
+        return answer_interval(self, name)
 
     def optimal_length(self) -> OptimalLength:
         """Return the best length, how certain it is with the errors of the bench, and what the choices cost.

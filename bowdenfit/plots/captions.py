@@ -7,18 +7,21 @@ import numpy as np
 from bowdenfit.parameters.symbols import to_plain_text
 from bowdenfit.words import counted
 
+WITH_BENCH_ERRORS = "measurements, priors and bench errors"
 
-def describe_curve(has_draws: bool, quantity: str = "") -> str:
+
+def describe_curve(has_draws: bool, quantity: str = "", sources: str = "measurements and priors") -> str:
     """Return the sentence that explains a line with a 90 % band.
 
     Args:
         has_draws: Whether there are draws; else the line is the least-squares estimate.
         quantity: The quantity shown, such as "the output force".
+        sources: What the band follows from.
     """
     of = f" of {quantity}" if quantity else ""
     if not has_draws:
         return f"Line: least-squares estimate{of}; without sampling there is no band."
-    return f"Line: median{of}; band: 90 % credible interval, from measurements and priors."
+    return f"Line: median{of}; band: 90 % credible interval, from {sources}."
 
 
 def describe_strip(unit_words: str) -> str:

@@ -294,7 +294,7 @@ def answer_interval(fit: Record, quantity: str) -> Interval:
         fit: The fit, with draws.
         quantity: Name of a parameter.
     """
-    return with_bench_errors(fit).parameter(quantity)
+    return with_bench_errors(fit).parameter_of_draws(quantity)
 
 
 def find_optimal_length(fit: Record) -> OptimalLength:

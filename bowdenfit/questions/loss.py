@@ -14,6 +14,7 @@ from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import Chart, PageSection, PageTable, Picture, Series, SeriesGroup, prose_section
 from bowdenfit.plots.style import MEDIAN, WIDE_INTERVAL
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.recorded.friction_effects import choose_recorded_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
 from bowdenfit.words import counted, listed, percent, table
@@ -87,6 +88,7 @@ def loss_by_contact(fit: Record) -> LossByContact | None:
     laws, route = fit.model.cable.laws, fit.dataset.description.route
     if fit.sampled is None or len(laws) < 2:
         return None
+    fit = with_bench_errors(fit)
     route_value, position = choose_recorded_length(fit)
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)

@@ -187,8 +187,8 @@ class Record(Display):
         """Name of the cable."""
         return self.dataset.description.name
 
-    def parameter(self, name: str) -> Interval:
-        """Return a parameter's value and interval, in the unit in which it is shown.
+    def parameter_of_draws(self, name: str) -> Interval:
+        """Return a parameter's value and interval by these draws, in the unit in which it is shown.
 
         Raises:
             UsageError: There is no such parameter, or no posterior.

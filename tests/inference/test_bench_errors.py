@@ -102,7 +102,7 @@ def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):
     assert fit.verdict().trusted and not any(error.contradicts_limit for error in fit.error_budget.learned)
     moved = with_bench_errors(fit)
     assert with_bench_errors(moved) is moved
-    assert fit.error_budget.row("mu").readings == alone.parameter("mu") == fit.parameter("mu")
+    assert fit.error_budget.row("mu").readings == alone.parameter("mu") == fit.parameter_of_draws("mu")
 
 
 def test_the_order_of_mountings_is_centered():

@@ -7,9 +7,12 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.description.defaults import BenchErrors
+from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.questions.error_budget import ErrorBudget
+from bowdenfit.questions.length import efficiency_figure
+from bowdenfit.questions.summary import coefficients_figure, pairs_figure
 
 MU, BENDS, LOADS = 0.12, (90.0, 90.0, 180.0, 180.0, 270.0, 270.0), (20.0, 50.0, 100.0)
 
@@ -45,7 +48,7 @@ def budget_of(fit) -> ErrorBudget:
 def test_a_slope_is_the_shift_of_a_fit_with_that_error(fit, tmp_path, error, limit, source):
     shifted = bf.fit(bench(tmp_path / "table.csv", **error), seed=1)
     row = budget_of(fit).row("mu")
-    moved = abs(shifted.parameter("mu").mean - fit.parameter("mu").mean)
+    moved = abs(shifted.parameter_of_draws("mu").mean - fit.parameter_of_draws("mu").mean)
     cells = np.sqrt(2) if source == "hysteresis" else 1.0  # two load cells have an error each
     assert row.shifts[source] * np.sqrt(3) / cells == pytest.approx(moved, abs=0.15 * row.readings.sd), limit
 
@@ -72,7 +75,8 @@ def test_the_first_page_of_a_precise_bench_has_the_interval_with_bench_errors_an
     assert f"coefficient of friction {row.bench}." in page
     assert "These intervals include bench errors, mainly wrap angles known to 3 deg and 3 % ([errors] in cable.toml);" in page
     assert f"readings alone say {row.readings.range_text(row.readings.digits)} for mu." in page
-    assert fit.summary()["error_budget"]["rows"][0]["bench"]["q05"] < fit.parameter("mu").q05
+    assert fit.summary()["error_budget"]["rows"][0]["bench"]["q05"] < fit.parameter_of_draws("mu").q05
+    assert fit.parameter("mu") == row.bench
 
 
 def test_the_first_page_of_a_scattering_bench_has_that_interval_too(fit):
@@ -124,3 +128,20 @@ def test_an_error_moves_forces_and_angles_as_a_bench_shows_them():
     assert error.apply_to_force(np.array([100.0, 100.0]), np.array([1, -1])) == pytest.approx([99.99, 102.01])
     angles = OwnAngles(("bend",), np.array([[1.0], [1.0], [0.0], [np.nan]]), np.array([[np.nan], [0.1], [np.nan], [np.nan]]))
     assert error.apply_to_rows(angles).angle.ravel() == pytest.approx([1.13, 1.0, 0.0, np.nan], nan_ok=True)
+
+
+def test_every_place_that_shows_an_answer_shows_the_same_interval(quick_fit):
+    mu, best = quick_fit.parameter("mu3"), quick_fit.optimal_length()
+    assert mu == budget_of(quick_fit).row("mu3").bench != quick_fit.parameter_of_draws("mu3")
+    row = quick_fit.summary()["parameters"]["mu3"]
+    assert (row["median"], row["q05"], row["q95"]) == (mu.median, mu.q05, mu.q95)
+    assert Interval.of(coefficients_figure.data(quick_fit)[2].draws) == mu
+    assert [Interval.of(q.draws) for q in pairs_figure.data(quick_fit).quantities[:3]] == [
+        quick_fit.parameter(name) for name in ("mu1", "mu2", "mu3")
+    ]
+    along = efficiency_figure.data(quick_fit)
+    assert Interval.of(along.optimal_length) == best.length
+    shown = [np.interp(470.0, along.efficiency.route, along.efficiency.quantiles[i]) for i in (0, 2, 4)]
+    (there,) = quick_fit.efficiency(470.0)
+    assert shown == pytest.approx([there.q05, there.median, there.q95], abs=1e-3)
+    assert quick_fit.summary()["loss"]["at"] == f"at {best.length.median:.0f} mm"

@@ -353,7 +353,7 @@ def friction_arm(fit: Record) -> tuple[float, str]:
 def typical_preload(fit: Record) -> float:
     """Return the preload [N]: its median, or least squares without draws, or the median of its prior as a last resort."""
     if fit.sampled is not None and PRELOAD in fit.sampled.values:
-        return fit.parameter(PRELOAD).median
+        return fit.parameter_of_draws(PRELOAD).median
     estimate = fit.least_squares.estimates[PRELOAD].value
     if np.isfinite(estimate):
         return float(estimate)

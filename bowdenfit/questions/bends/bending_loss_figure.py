@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.captions import describe_curve
+from bowdenfit.plots.captions import WITH_BENCH_ERRORS, describe_curve
 from bowdenfit.plots.curves import draw_quantiles, name_band
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, count_columns, legend_above, panels
 from bowdenfit.plots.panels import label_outer, span
@@ -79,10 +79,11 @@ def data(fit: Record) -> BendingLoss | None:
 
 def caption(loss: BendingLoss) -> str:
     """Describe what is drawn, in plain words."""
+    line = describe_curve(len(loss.fitted) > 1, sources=WITH_BENCH_ERRORS)
     return (
         "Efficiency, output over input force while moving forward, against the wrap angle, at "
         f"{significant(loss.input_force, 4)} N input "
-        f"force. Black: the cable as fitted. {describe_curve(len(loss.fitted) > 1)} In color: the same cable with other "
+        f"force. Black: the cable as fitted. {line} In color: the same cable with other "
         "friction coefficients and other preloads. Dashed: the capstan equation alone, which has no preload. Circles: "
         f"measured, between the readings next to that input force, n = {counted(len(loss.points_wrap_angle), 'wrap angle')}."
     )

@@ -14,6 +14,7 @@ from bowdenfit.questions.bends.bent_cable import has_preload
 from bowdenfit.questions.bends.curves import POINTS, QUANTILES, Values, evaluate_curves, quantiles_of_draws
 from bowdenfit.questions.bends.loops_figure import MOST, RECORDED, LoopCurve
 from bowdenfit.questions.bends.preload_window_figure import COARSE, FINE, PreloadWindowCurves
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.recorded.traces import collect_loop_points
 from bowdenfit.results.record import Record
 from bowdenfit.words import significant
@@ -77,6 +78,7 @@ def collect_bending_loss(fit: Record) -> BendingLoss | None:
     bends, measured = range_of_bends(fit), measured_loop_bends(fit)
     if bends is None or measured is None:
         return None
+    fit = with_bench_errors(fit)
     elastic, typical = elastic_answers(fit), typical_preload(fit)
     angles, force = np.linspace(*bends, POINTS), elastic.reference_force
     preloads = np.unique([float(f"{typical * factor:.2g}") for factor in TIMES_PRELOAD])
@@ -123,6 +125,7 @@ def collect_preload_window(fit: Record) -> PreloadWindowCurves | None:
     bends = range_of_bends(fit)
     if bends is None:
         return None
+    fit = with_bench_errors(fit)
     elastic = elastic_answers(fit)
     bent, coarse = (
         elastic.bend_to(np.linspace(*bends, COARSE)),

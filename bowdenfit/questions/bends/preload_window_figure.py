@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import describe_curve
+from bowdenfit.plots.captions import WITH_BENCH_ERRORS, describe_curve
 from bowdenfit.plots.curves import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.panels import span
@@ -68,9 +68,10 @@ def data(fit: Record) -> PreloadWindowCurves | None:
 
 def caption(window: PreloadWindowCurves) -> str:
     """Describe what is drawn, in plain words."""
+    line = describe_curve(len(window.friction) > 1, sources=WITH_BENCH_ERRORS)
     return (
         "What a preload costs and what it buys. Above: the friction in free motion at the bend where it is "
-        f"largest. {describe_curve(len(window.friction) > 1)} Below: the probability that both sides of the loop stay taut "
+        f"largest. {line} Below: the probability that both sides of the loop stay taut "
         "over all bends. Green: preloads for which that is nearly sure; the vertical line is the lowest that keeps both "
         "sides taut. Nothing here is measured directly; it follows from the fit."
     )

@@ -56,7 +56,7 @@ def describe_implausible_friction(fit: Record) -> str:
                 estimate.value + estimate.reach if np.isnan(estimate.upper) else estimate.upper,
             )
         else:
-            value, upper = fit.parameter(p.name).median, fit.parameter(p.name).q95
+            value, upper = fit.parameter_of_draws(p.name).median, fit.parameter_of_draws(p.name).q95
         if value > _MOST or upper < _LEAST:
             implausible.append(f"{p.name} = {value:.2g}")
     if not implausible:

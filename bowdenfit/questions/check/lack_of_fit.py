@@ -62,7 +62,7 @@ def _describe_delay(fit: Record) -> tuple[str, ...]:
     if delay is None or not isinstance(delay.prior, Normal):
         return ()
     by_least_squares = fit.sampled is None
-    off = fit.least_squares.estimates[delay.name].value if by_least_squares else fit.parameter(delay.name).median
+    off = fit.least_squares.estimates[delay.name].value if by_least_squares else fit.parameter_of_draws(delay.name).median
     sds = abs(off) / delay.shown_scale / float(delay.prior.sd)
     if not sds >= _MAX_DELAY_ERRORS:  # nor where it is not determined
         return ()

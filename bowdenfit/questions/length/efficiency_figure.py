@@ -94,24 +94,22 @@ class EfficiencyAlongRoute:
 
 def data(fit: Record) -> EfficiencyAlongRoute | None:
     """Return efficiency along the route and its optimum; None without a route."""
-    from bowdenfit.questions.error_budget import find_optimal_length  # here, because drawing again needs no JAX
+    from bowdenfit.questions import error_budget  # here, because drawing again needs no JAX
 
-    route, posterior = fit.dataset.description.route, fit.sampled
+    route, with_errors = fit.dataset.description.route, error_budget.with_bench_errors(fit)
     if route is None:
         return None
     friction = fit.model.cable.friction
     force = friction.conditions.reference_force if friction.depends_on_load else None
     points = length.collect_efficiency_points(fit)
     left_out = fit.dataset.measurements.excluded_points("efficiencies", route.variable, "efficiency")
-    shown = EfficiencyAlongRoute(
-        route.label, route.range, length.compute_curves(fit)["efficiency"], points, at_input_force=force, left_out=left_out
-    )
-    if posterior is None:
+    efficiency = length.compute_curves(with_errors)["efficiency"]
+    shown = EfficiencyAlongRoute(route.label, route.range, efficiency, points, at_input_force=force, left_out=left_out)
+    if fit.sampled is None:
         return shown
-    mounted = length.compute_new_run_interval(fit) if any(p.of_runs for p in points) else None
-    return replace(
-        shown, optimum=find_optimal_length(fit), optimal_length=length.collect_optimal_lengths(fit), new_run=mounted
-    )
+    mounted = length.compute_new_run_interval(with_errors) if any(p.of_runs for p in points) else None
+    best = error_budget.find_optimal_length(fit)
+    return replace(shown, optimum=best, optimal_length=length.collect_optimal_lengths(with_errors), new_run=mounted)
 
 
 def caption(data: EfficiencyAlongRoute) -> str:
@@ -141,7 +139,8 @@ def _describe_curve(data: EfficiencyAlongRoute) -> str:
     has_draws = not data.efficiency.is_line
     return " ".join(filter(None, (
         "Efficiency of the cable, output over input force, against the length.",
-        "Line: median; bands: the intervals that hold the efficiency of the cable with 50 % and 90 % probability."
+        "Line: median; bands: the intervals that hold the efficiency of the cable with 50 % and 90 % probability, bench "
+        "errors included."
         if has_draws else "Line: least squares.",
         "Dotted: nine of ten runs lie between these lines, because no two mountings are alike."
         if data.new_run is not None else "",

@@ -73,7 +73,8 @@ def caption(data: WrapAngles) -> str:
     has_draws = not data.curves[0].band.is_line
     return " ".join(filter(None, (
         f"Wrap angle of {counted(len(data.curves), 'contact')} along the route, with the curve through the readings.",
-        "Line: median; bands: the intervals that hold the curve with 50 % and 90 % probability."
+        "Line: median; bands: the intervals that hold the curve with 50 % and 90 % probability, by the angles as they were "
+        "read."
         if has_draws else "Line: least squares.",
         "Dashed: the curve's family alone, without its smooth departure."
         if any(len(c.family_alone) for c in data.curves) else "",

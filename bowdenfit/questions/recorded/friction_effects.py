@@ -15,6 +15,7 @@ from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.physics.friction import rate_slope
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.recorded.dependence_figure import Dependence
 from bowdenfit.questions.recorded.traces import QUANTILES
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -76,7 +77,7 @@ def compare_speeds(fit: Record) -> RateEffect | None:
     slow, fast = find_speed_range(fit)
     at, place = choose_recorded_length(fit)
     with jax.enable_x64(True):
-        difference = _efficiency_differences(fit, at, slow, fast)
+        difference = _efficiency_differences(with_bench_errors(fit), at, slow, fast)
     interval = Interval.of(difference)
     return RateEffect(slow * scale, fast * scale, unit, place, interval, float(np.mean(difference < 0)))
 
@@ -148,7 +149,7 @@ def predict_stick_slip(fit: Record) -> StickSlip | None:
     unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
     slow, fast = find_speed_range(fit)
     speeds = np.unique(np.geomspace(max(slow, 1e-9), max(fast, 1e-9), _N_SPEEDS))
-    falls = np.mean(compute_friction_slopes(fit, speeds) < 0, axis=0)
+    falls = np.mean(compute_friction_slopes(with_bench_errors(fit), speeds) < 0, axis=0)
     return StickSlip(tuple(float(speed * scale) for speed in speeds), unit, tuple(float(p) for p in falls))
 
 
@@ -226,6 +227,7 @@ def compute_lost_force(fit: Record) -> LostForce | None:
     friction = fit.model.cable.friction
     if fit.sampled is None or DRAG not in friction.options:
         return None
+    fit = with_bench_errors(fit)
     at, place = choose_recorded_length(fit)
     route, best = fit.dataset.description.route, fit.posterior.optimum.get(OPTIMAL_LENGTH)
     if route is not None and best is not None:

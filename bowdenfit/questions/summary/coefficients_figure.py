@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
 from bowdenfit.parameters.symbols import to_plain_text
-from bowdenfit.plots.captions import count_shown, explain_symbols
+from bowdenfit.plots.captions import WITH_BENCH_ERRORS, count_shown, explain_symbols
 from bowdenfit.plots.curves import GRID_POINTS, choose_evenly, density, limits, support
 from bowdenfit.plots.layout import (
     TITLE,
@@ -73,7 +73,9 @@ class Coefficient:
 
 def data(fit: Record) -> tuple[Coefficient, ...] | None:
     """Return the parameters that belong to friction, constant angles or sensors; None without draws."""
-    posterior, estimates, coefficients = fit.sampled, fit.least_squares.estimates, []
+    from bowdenfit.questions.error_budget import with_bench_errors  # here, as drawing again needs no JAX
+
+    posterior, estimates, coefficients = with_bench_errors(fit).sampled, fit.least_squares.estimates, []
     if posterior is None:
         return None
     for p in (p for role in ROLES for p in fit.model.space.free if p.role == role):
@@ -91,8 +93,8 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
     """Describe what is drawn, in plain words."""
     return (
         f"What the measurements say of {counted(len(parameters), 'coefficient')}. Shaded: how plausible each value is, "
-        "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
-        "standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
+        f"{WITH_BENCH_ERRORS} considered; dashed: by the prior alone; square with bar: the least-squares estimate with "
+        "its standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
         f"{explain_symbols((p.symbol, p.meaning) for p in parameters)}"
         f"n = {parameters[0].draws.size} draws from the posterior."
     )

@@ -50,7 +50,7 @@ def _family(fit: Record, curve: Curve) -> str:
 
 def _size(fit: Record, curve: Curve) -> str:
     """Median and 90 % interval of the departure [deg]."""
-    interval = fit.parameter(curve.rms_name)
+    interval = fit.parameter_of_draws(curve.rms_name)
     return f"{interval.median:z.{interval.digits}f} ({interval.range_text(interval.digits)})"
 
 

@@ -14,7 +14,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.error_budget import budget_text, find_optimal_length
+from bowdenfit.questions.error_budget import answer_interval, budget_text, find_optimal_length
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
@@ -312,8 +312,8 @@ def parameters_text(fit: Record) -> str:
 
 
 def posterior_intervals(fit: Record) -> dict[str, Interval]:
-    """Return the posterior interval of every parameter that was sampled; empty without draws."""
-    return {p.name: fit.parameter(p.name) for p in fit.model.space.free} if fit.sampled is not None else {}
+    """Return the interval of every parameter that was sampled, errors of the bench included; empty without draws."""
+    return {p.name: answer_interval(fit, p.name) for p in fit.model.space.free} if fit.sampled is not None else {}
 
 
 def _row(parameter: Parameter, interval: Interval | None, estimate: Estimate | None, sampled: bool) -> tuple[str, ...]:

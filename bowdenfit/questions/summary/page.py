@@ -16,7 +16,7 @@ from bowdenfit.kinds.runs import RunsData
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.answer import check_readings
-from bowdenfit.questions.error_budget import error_budget, find_optimal_length
+from bowdenfit.questions.error_budget import answer_interval, error_budget, find_optimal_length, with_bench_errors
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss import loss_by_contact
@@ -162,7 +162,7 @@ def _parameter_row(fit: Record, name: str) -> dict[str, Any]:
         row["least_squares"] = fit.least_squares.estimates[name]
     if fit.sampled is not None and name in fit.posterior.values:
         draws, diagnostics = fit.posterior.values[name], fit.posterior.diagnostics[name]
-        row |= vars(fit.parameter(name)) | {
+        row |= vars(answer_interval(fit, name)) | {
             "ess_bulk": diagnostics.ess_bulk,
             "ess_tail": diagnostics.ess_tail,
             "r_hat": diagnostics.r_hat,
@@ -186,7 +186,8 @@ def _curve_row(fit: Record, name: str) -> dict[str, Any]:
     """Return what is known of a derived curve coefficient, as plain data."""
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
     if fit.sampled is not None:
-        ordered = np.sort(fit.posterior.values[name], axis=None)  # some may be infinite, and are not to be interpolated
+        draws = with_bench_errors(fit).posterior.values[name]
+        ordered = np.sort(draws, axis=None)  # some may be infinite, and are not to be interpolated
         q05, median, q95 = (ordered[round(q * (len(ordered) - 1))] for q in (0.05, 0.5, 0.95))
         row |= {"median": float(median), "q05": float(q05), "q95": float(q95)}
     return row

@@ -91,6 +91,9 @@ def data(fit: Record) -> Pairs | None:
 
     None where there are no two to draw against each other.
     """
+    from bowdenfit.questions.error_budget import with_bench_errors  # here, as drawing again needs no JAX
+
+    fit = with_bench_errors(fit)
     answer, route = summary.collect_optimum_quantities(fit), fit.dataset.description.route
     quantities = summary.collect_sampled_quantities(fit, ROLES)[: MOST_QUANTITIES - len(answer)] + answer
     best = route.variable.replace("_", " ") if route is not None and answer else ""
@@ -100,10 +103,10 @@ def data(fit: Record) -> Pairs | None:
 def caption(data: Pairs) -> str:
     """Describe what is drawn, in plain words."""
     return (
-        "Every two parameters of the posterior against each other, and the distribution of each on the diagonal. Dark and "
-        "light blue: the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that two "
-        "parameters are correlated: the measurements determine a combination of them better than either. Dashed, and "
-        "written above: median and 90 % interval. "
+        "Every two parameters of the posterior, bench errors included, against each other, and the distribution of each on "
+        "the diagonal. Dark and light blue: the smallest areas that hold the truth with 68 % and 95 % probability; a long "
+        "slanted area means that two parameters are correlated: the measurements determine a combination of them better than "
+        "either. Dashed, and written above: median and 90 % interval. "
         f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.quantities[0].draws.size} draws from the posterior."
     )
@@ -260,9 +263,9 @@ def make_pair_charts(data: Pairs) -> tuple[Chart, ...]:
 def describe_pair_charts(data: Pairs) -> str:
     """Describe the charts, two quantities at a time."""
     return (
-        "Two parameters of the posterior against each other, the most correlated first. Dark and light: the smallest areas "
-        "that hold the truth with 68 % and 95 % probability; a long slanted area means that the measurements determine a "
-        "combination of the two better than either. Upright line: median. "
+        "Two parameters of the posterior, bench errors included, against each other, the most correlated first. Dark and "
+        "light: the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that the "
+        "measurements determine a combination of the two better than either. Upright line: median. "
         f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.quantities[0].draws.size} draws from the posterior."
     )

@@ -12,6 +12,7 @@ from terminal_pages import faults
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.style import rounded_texts
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.summary import brief
 from bowdenfit.questions.summary.brief import KeyQuantity, summary_text
 from bowdenfit.questions.summary.details import details_text
@@ -152,7 +153,7 @@ def test_the_summary_has_every_key_of_the_format(fit):
 
 
 def test_the_summary_agrees_with_the_draws(fit):
-    row, draws = fit.summary()["parameters"]["mu2"], fit.posterior.values["mu2"]
+    row, draws = fit.summary()["parameters"]["mu2"], with_bench_errors(fit).posterior.values["mu2"]
     assert row["mean"] == pytest.approx(draws.mean())
     assert row["q95"] == pytest.approx(np.quantile(draws, 0.95))
 

@@ -123,8 +123,8 @@ def test_a_growing_table_is_fitted_by_programs_compiled_once(bench):
         assert record.converged
     assert len(fits.samplers) == len(fits.programs) == 1
     by_hand = bf.fit(bench.folder, seed=1)
-    assert record.parameter("mu").median == pytest.approx(by_hand.parameter("mu").median, abs=0.0005)
-    assert record.parameter("mu").sd == pytest.approx(by_hand.parameter("mu").sd, rel=0.1)
+    assert record.parameter_of_draws("mu").median == pytest.approx(by_hand.parameter_of_draws("mu").median, abs=0.0005)
+    assert record.parameter_of_draws("mu").sd == pytest.approx(by_hand.parameter_of_draws("mu").sd, rel=0.1)
     assert assess_fit(fits.complete(record)).troubles == by_hand.verdict().troubles
 
 

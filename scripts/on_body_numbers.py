@@ -60,8 +60,8 @@ def span(fit: bf.Fit, name: str) -> str:
 
 
 def share(fit: bf.Fit, name: str) -> str:
-    """Standard deviation of a coefficient in percent of it."""
-    estimate = fit.parameter(name)
+    """Standard deviation of a coefficient in percent of it, by the readings alone, as `bowdenfit identify` gives it."""
+    estimate = fit.parameter_of_draws(name)
     return f"{100 * estimate.sd / estimate.mean:.0f} %"
 
 

@@ -69,7 +69,8 @@ def is_named(seed: int, kind: str, path: Path, keywords: dict[str, object], mess
         bench = draw_bench(seed)
         if "sampling gets past kinks" in message:
             fit = bf.fit(path, seed=1, **keywords)
-            return fit.verdict().trusted and fit.parameter("mu").q05 <= bench.exponent / WRAP <= fit.parameter("mu").q95
+            mu = fit.parameter_of_draws("mu")
+            return fit.verdict().trusted and mu.q05 <= bench.exponent / WRAP <= mu.q95
         return bench.noise >= 0.03 and bench.correlated >= 0.1 and "The likeliest cause is noise" in message
     for friction in REMEDIES[kind]:
         if f"--friction {friction}" in message:

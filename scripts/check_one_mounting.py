@@ -96,7 +96,7 @@ def main() -> None:
                 texts.append(" ".join(str(once).split()))
                 second = bench.measure(np.random.default_rng([options.seed, number, seed]), "2")
                 twice = bf.fit(write(Path(scratch) / "twice", join(first, second)), seed=seed)
-                interval, stated_value = twice.parameter("mu"), once.second_mounting
+                interval, stated_value = twice.parameter_of_draws("mu"), once.second_mounting
                 held += stated_value.low <= interval.q95 - interval.q05 <= stated_value.high
         wordings, worst = compare_advice(texts)
         inside += held

@@ -60,7 +60,7 @@ class Shown:
 def shown(fit: bf.Fit, mountings: int) -> Shown:
     """What the summary shows of the coefficient."""
     if fit.sampled is not None:
-        computed = fit.parameter("mu")
+        computed = fit.parameter_of_draws("mu")
         return Shown(computed.median, computed.q05, computed.q95, mountings - 1 or MANY)
     estimate = fit.least_squares.estimates["mu"]
     errors = (estimate.upper - estimate.lower) / 2 / estimate.standard_error

@@ -175,7 +175,7 @@ def fit_bench(task: tuple[str, int, str]) -> dict[str, Any]:
         except bf.BowdenfitError as error:
             return row | {"ended": f"refused: {str(error)[:120]}"}
     verdict, optimum, truth = fit.verdict(), fit.optimal_length(), bench.truth
-    intervals = {f"mu{n}": fit.parameter(f"mu{n}") for n in (1, 2, 3)} | {
+    intervals = {f"mu{n}": fit.parameter_of_draws(f"mu{n}") for n in (1, 2, 3)} | {
         "length": optimum.length, "efficiency": optimum.efficiency,
     }  # fmt: skip
     row["ended"] = "trusted" if verdict.trusted else "not trusted"

@@ -157,7 +157,7 @@ def test_a_column_of_a_gait_is_named_by_the_option_that_there_is(fit, quick_resu
 def test_another_seed_leaves_the_posterior_and_draws_other_mountings(fit):
     other = fit.with_seed(fit.provenance.seed + 1)
     assert isinstance(other, bf.Fit) and fit.with_seed(None) is fit
-    assert other.parameter("mu1") == fit.parameter("mu1")
+    assert other.parameter_of_draws("mu1") == fit.parameter_of_draws("mu1")
     assert not np.array_equal(other.mounting(), fit.mounting())
     for verb in (bf.compensate, bf.teleoperate):
         assert signature(verb).parameters["seed"].default is None

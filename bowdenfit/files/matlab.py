@@ -23,7 +23,8 @@ from bowdenfit.files.channels import (
     refuse_too_large,
     to_floats,
 )
-from bowdenfit.files.clocks import assign_group_clocks, assign_interval_times, assign_only_clock
+from bowdenfit.files.clock_settings import assign_interval_times
+from bowdenfit.files.clocks import assign_group_clocks, assign_only_clock
 from bowdenfit.files.hdf5 import iterate_members
 
 MOST_COLUMNS = 64  # judged: a wider matrix is an image or a spectrum, no set of channels

@@ -314,6 +314,8 @@ def _find_late_output(
     lasting = slice(*np.searchsorted(common.time, limits).tolist())  # what has a partner with the delay and without
     if _scan(common, ends, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
         return None  # something else than the delay differs between the parts of the recording
+    if abs(late.delay) > scan.near and any(_scan(common, ends, part, _ALL).follows for part in _thirds(common)):
+        return None  # as where one cell was tared in between, which the rest does not share
     if late.rival is not None:
         raise DatasetError(
             f"{raw.file}: in {raw.name!r} the output follows the input if it is {late.delay:.3g} s late, and about as well if "
@@ -323,6 +325,12 @@ def _find_late_output(
             "record a pause before the first stroke."
         )
     return late
+
+
+def _thirds(common: CommonClock) -> list[slice]:
+    """Return three parts of a recording of equal length, of which a single event leaves two as they are."""
+    ends = [0, *(len(common.time) * part // 3 for part in (1, 2)), len(common.time)]
+    return [slice(begin, end) for begin, end in pairwise(ends)]
 
 
 def _is_opposed(common: CommonClock, good: Flags) -> bool:

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.clocks import names_time, unit_of_time
-from bowdenfit.files.spellings import parse_heading
+from bowdenfit.files.spellings import names_force, parse_heading
 from bowdenfit.units import ColumnSource, differing_units, is_unit, measures, weight_of
 from bowdenfit.words import shown
 
@@ -218,19 +218,21 @@ def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--
 def rank_headings(headings: Sequence[tuple[str, str]], dimension: str) -> list[int]:
     """Return which columns may measure a dimension, the likeliest first: by their unit, by a weight, without one, others.
 
+    Of equal ones those whose heading has a word for a force come first, where that is the dimension.
+
     Args:
         headings: Heading of each column, and the unit that the file gives elsewhere; both may be empty.
         dimension: Such as "force".
     """
-    ranks = list[tuple[int, int]]()
+    ranks = list[tuple[int, bool, int]]()
     for i, (heading, below) in enumerate(headings):
         unit = heading_of(heading, below).unit
         fits = measures(unit, dimension)
         weighs = dimension == "force" and bool(weight_of(unit))
         rank = 0 if fits else 1 if weighs else 2 if not unit else 3
         if heading and (dimension == "time" or not names_time(heading) or parse_heading(heading, below)):
-            ranks.append((rank, i))
-    return [i for _, i in sorted(ranks)]
+            ranks.append((rank, dimension == "force" and not names_force(heading), i))
+    return [i for _, _, i in sorted(ranks)]
 
 
 def unit_to_state(heading: str, below: str, usual: str) -> str:

@@ -17,6 +17,7 @@ from bowdenfit.units import ColumnSource, differing_units, is_unit, measures, we
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")  # of a column, behind the name of its table
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 # `F_in` is no force in inches, nor `cell_A` one in ampere: behind a name only what cannot be a word counts as unit.
 _SUFFIXES = (
@@ -84,6 +85,11 @@ def heading_of(text: str, unit: str = "") -> Heading:
     if name and unit not in {"", "-", "1"} and is_unit(unit):
         return Heading(name, unit)
     return Heading(plain, _unit_behind(plain) or unit_of_time(plain))
+
+
+def unit_in_name(name: str) -> str:
+    """Return the unit in the last part of the name of a channel, such as "rec.F_in_N" or "bench/t_ms"; empty without one."""
+    return heading_of(re.split(r"[/.](?=[^/.]+$)", _INDEX.sub("", name))[-1]).unit
 
 
 def _unit_behind(heading: str) -> str:

@@ -224,20 +224,21 @@ def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--
 def rank_headings(headings: Sequence[tuple[str, str]], dimension: str) -> list[int]:
     """Return which columns may measure a dimension, the likeliest first: by their unit, by a weight, without one, others.
 
-    Of equal ones those whose heading has a word for a force come first, where that is the dimension.
+    Of equal ones those with a word for a force come first, where that is the dimension and several have one.
 
     Args:
         headings: Heading of each column, and the unit that the file gives elsewhere; both may be empty.
         dimension: Such as "force".
     """
-    ranks = list[tuple[int, bool, int]]()
+    ranks, named = list[tuple[int, bool, int]](), [names_force(heading) for heading, _ in headings]
+    by_name = dimension == "force" and named.count(True) > 1
     for i, (heading, below) in enumerate(headings):
         unit = heading_of(heading, below).unit
         fits = measures(unit, dimension)
         weighs = dimension == "force" and bool(weight_of(unit))
         rank = 0 if fits else 1 if weighs else 2 if not unit else 3
         if heading and (dimension == "time" or not names_time(heading) or parse_heading(heading, below)):
-            ranks.append((rank, dimension == "force" and not names_force(heading), i))
+            ranks.append((rank, by_name and not named[i], i))
     return [i for _, _, i in sorted(ranks)]
 
 

@@ -390,4 +390,5 @@ def _column_of_channel(channel: Channel, times_others: bool) -> FileColumn:
     unit = channel.unit or heading_of(channel.name).unit
     ends = ["".join(f"{value:.5g}" for value in part) for part in (channel.values[:1], channel.values[-1:])]
     different, is_time = len(channel.values), times_others or is_clock(channel)
-    return FileColumn(channel.name, channel.unit, unit, channel.values, True, is_time, different, 0, *ends)
+    valid_unit = unit if unit and is_unit(unit) else ""
+    return FileColumn(channel.name, channel.unit, valid_unit, channel.values, True, is_time, different, 0, *ends)

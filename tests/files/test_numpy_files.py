@@ -39,6 +39,17 @@ def test_units_are_those_that_the_names_state(tmp_path, ending, write):
     np.testing.assert_allclose(read["F_out_N"].values, COLUMNS["F_out_N"])
 
 
+@pytest.mark.parametrize("unit", ["degC", "dB", "counts", "%RH"])
+def test_a_channel_in_a_unit_that_nothing_needs_does_no_harm(tmp_path, run, unit):
+    force = 40 + 20 * np.sin(3 * TIME)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, values, of in (("t", TIME, "s"), ("F_in", force, "N"), ("F_out", 0.8 * force, "N"), ("other", 0 * TIME, unit)):
+            file[name] = values
+            file[name].attrs["units"] = of
+    _, out, err = run("check", tmp_path / "a.h5")
+    assert "a recording" in out and "F_out" in out and not err
+
+
 def test_an_archive_gives_vectors_columns_fields_and_a_rate(tmp_path):
     fields = np.rec.fromarrays([FORCE, TIME], names="in_N,t_s")
     np.savez(tmp_path / "a.npz", both=np.stack([FORCE, TIME], axis=1), rec=fields, fs=50.0, note="gauge")

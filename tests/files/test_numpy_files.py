@@ -43,7 +43,8 @@ def test_units_are_those_that_the_names_state(tmp_path, ending, write):
 def test_a_channel_in_a_unit_that_nothing_needs_does_no_harm(tmp_path, run, unit):
     force = 40 + 20 * np.sin(3 * TIME)
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        for name, values, of in (("t", TIME, "s"), ("F_in", force, "N"), ("F_out", 0.8 * force, "N"), ("other", 0 * TIME, unit)):
+        columns = ("t", TIME, "s"), ("F_in", force, "N"), ("F_out", 0.8 * force, "N"), ("other", 0 * TIME, unit)
+        for name, values, of in columns:
             file[name] = values
             file[name].attrs["units"] = of
     _, out, err = run("check", tmp_path / "a.h5")

@@ -221,7 +221,7 @@ def _clean(raw: RawRecording, settings: Preparation) -> _Cleaned:
     ]
     for name, channel in zip(names, channels, strict=True):
         if not raw.loop:
-            check_sign(raw.file, name, channel.force)
+            check_sign(raw, name, channel.force)
     ends = max(e[0] for _, e in flagged), min(e[1] for _, e in flagged)
     return _Cleaned(channels[0], channels[1], ends, (tares[0][0], tares[1][0]), (tares[0][1], tares[1][1]))
 

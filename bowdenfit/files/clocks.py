@@ -1,16 +1,15 @@
 """The time of each channel of a recording: from a column that is a clock, or from a stated sampling rate.
 
 Sheets have clocks beside their channels (`assign_clocks`); files with groups have them in the same group or around it
-(`assign_group_clocks`). A sampling rate may be a single number in the file (`assign_interval_times`), or a line over the data
+(`assign_group_clocks`). A sampling rate may be a single number in the file (`files/clock_settings.py`), or a line over the data
 (`assign_rate_times`).
 """
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,7 @@ _LABVIEW = "x_value"
 _SECOND_SPELLINGS = {"sek", "sek.", "sec.", "seg", "secs"}
 _RATIO = re.compile(r"[A-Za-z]_?\d?/[A-Za-z]_?\d?")  # of two symbols, such as T/t
 _TENSION = re.compile(r"T_?\d")  # a clock only where it rises
-_EPOCH_UNITS = (
+EPOCH_UNITS = (
     (1e17, 1e-9),
     (1e14, 1e-6),
     (1e11, 1e-3),
@@ -47,18 +46,6 @@ _DATE = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?(?:[ T].*)?|\d\d?[./-]\d\d?[./-]\d{4
 _HALF = r"(?P<half>[AaPp])\.?\s?[Mm]\.?"  # AM or PM
 _TIME_OF_DAY = re.compile(rf"\d{{1,3}}:\d\d(?::\d\d(?:[.,]\d+)?)?(?:\s*{_HALF})?")
 _AM_OR_PM = re.compile(rf"(?<=\d)\s*{_HALF}$")
-_RATE_NAMES = {
-    "fs", "f_s", "rate", "samplingrate", "samplerate", "samplefrequency", "samplingfrequency", "sampfreq", "fsample",
-    "fsampling", "acquisitionrate", "samplespersecond",
-}  # fmt: skip
-_INTERVAL_NAMES = {
-    "dt", "deltat", "ts", "tsample", "sampletime", "sampletimes", "samplinginterval", "sampleinterval", "samplingtime",
-    "timestep", "samplingperiod", "sampleperiod",
-}  # fmt: skip
-_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")
-
-Settings = Mapping[str, Mapping[str, Any]]
-"""Single values by name, such as the attributes of a data set, for each data set and group: "bench" or "rec.run"."""
 
 _STATED_RATE = re.compile(
     r"(?P<what>(?:sampl\w*|scan\w*|acquisition|acq\.?|data|logging)[\s_-]*(?:rate|freq\w*|interval|period|time|step)|rate|"
@@ -179,7 +166,7 @@ def dated_seconds(clock: Channel) -> tuple[Vector, float | None]:
     largest = max(-lowest, highest)
     factor = _time_factor(clock.unit)
     if factor is None:
-        factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
+        factor = next((factor for bound, factor in EPOCH_UNITS if largest > bound), 1.0)
     if largest * factor > YEARS:
         return _subtract_first(clock.values) * factor, float(clock.values[finite][0]) * factor
     return clock.values if factor == 1 else clock.values * factor, clock.start
@@ -286,61 +273,6 @@ def _subtract_first(seconds: Vector) -> Vector:
     """Return seconds from the first that is known."""
     finite = seconds[np.isfinite(seconds)]
     return seconds - finite[0] if len(finite) else seconds
-
-
-def assign_interval_times(channels: Iterable[Channel], settings: Settings) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
-    """Give channels without a clock the times that follow from their sampling rate, and say so.
-
-    Args:
-        channels: The channels of a file.
-        settings: Where rates [1/s] and intervals [s] may stand.
-
-    Returns:
-        All channels in their order, and a remark on each setting that was used.
-    """
-    result, used = [], dict[str, float]()
-    for channel in channels:
-        setting = _nearest(channel.name, settings) if channel.time is None and not is_clock(channel) else None
-        if setting:
-            interval, name = setting
-            used[name] = interval
-            channel = replace(channel, time=np.arange(len(channel.values)) * interval, clock=name)
-        result.append(channel)
-    return tuple(result), tuple(
-        f"Without a time channel the time was counted from the first sample by {name} ({1 / interval:.6g} samples a "
-        "second)."
-        for name, interval in used.items()
-    )
-
-
-def _nearest(name: str, settings: Settings) -> tuple[float, str] | None:
-    """Return seconds between samples, by the first setting of a channel itself, its group or those around it, and its name."""
-    owners = (_INDEX.sub("", name), *(group[:-1] for group in groups_around(name)))
-    intervals = (_interval(*setting) for owner in owners for setting in settings.get(owner, {}).items())
-    return next((interval for interval in intervals if interval), None)
-
-
-def _interval(name: str, value: Any) -> tuple[float, str] | None:
-    """Return seconds between samples by one setting, and its name; None if it says nothing of them."""
-    number, words = _positive(value), {_normalize(name), _normalize(name.rpartition(".")[2])}
-    if number is not None and words & _RATE_NAMES:
-        return 1 / number, name
-    return (number, name) if number is not None and words & _INTERVAL_NAMES else None
-
-
-def _normalize(name: str) -> str:
-    """Return the name in lower case without what separates words and without a unit behind it."""
-    letters = name.lower().replace("_", "").replace(" ", "").replace("-", "").replace(".", "")
-    return letters.removesuffix("hz") or letters
-
-
-def _positive(value: Any) -> float | None:
-    """Return the value as a number if it is one, single, finite and above 0."""
-    array = np.asarray(value)
-    if array.size != 1 or array.dtype.kind not in "fiu":
-        return None
-    number = float(array.reshape(-1)[0])
-    return number if np.isfinite(number) and number > 0 else None
 
 
 def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:

@@ -26,6 +26,7 @@ FORMATS: dict[str, str | Callable[[Path], ChannelFile]] = {
     **dict.fromkeys((".parquet", ".pq"), f"{_ROOM}.parquet"),
     ".mat": f"{_ROOM}.matlab",
     **dict.fromkeys((".h5", ".hdf5"), f"{_ROOM}.hdf5"),
+    **dict.fromkeys((".npz", ".npy"), f"{_ROOM}.numpy_arrays"),
     ".tdms": f"{_ROOM}.tdms",
     **dict.fromkeys((".mf4", ".mdf"), f"{_ROOM}.mdf"),
     ".cmbl": f"{_ROOM}.logger_pro",
@@ -68,6 +69,7 @@ _STARTS = {  # the longer start before the shorter one
     b"MATLAB 5": Content("a MATLAB file", (".mat",)),
     b"MATLAB 7": Content("a MATLAB 7.3 file", (".mat",)),
     _HDF: Content("an HDF5 file", (".h5", ".hdf5")),
+    b"\x93NUMPY": Content("an array of NumPy", (".npy",)),
     b"TDSm": Content("a TDMS file of National Instruments", (".tdms",)),
     b"TDSh": Content("the index of a TDMS file", (), "give the .tdms file next to it"),
     b"MDF     ": Content("an MDF measurement file", (".mf4", ".mdf")),
@@ -92,12 +94,13 @@ _STARTS = {  # the longer start before the shorter one
 }
 PLAIN_TEXT = Content("text", TEXT)
 _ZIP = Content("a ZIP archive", WORKBOOKS, _UNPACK)  # what is left of a workbook, perhaps
+_ARRAYS = Content("an archive of NumPy", (".npz",))
 _NO_WORKBOOK = Content("a ZIP archive", (), _UNPACK)
 _WORKBOOK = Content("an Excel workbook", WORKBOOKS)
 _OPEN_DOCUMENT = Content("an OpenDocument spreadsheet", (), "open it in LibreOffice and save it as .xlsx")
 _PAGE = Content("a web page", (), "download the recording itself, or export it as CSV")
 _XML = Content("an XML file, such as those of Logger Pro (.cmbl)", (".cmbl",), _EXPORT)
-_CONTENTS = (UNKNOWN, *_STARTS.values(), _ZIP, _XML)
+_CONTENTS = (UNKNOWN, *_STARTS.values(), _ZIP, _ARRAYS, _XML)
 
 
 def read_channels(path: Path, sheet: str = "") -> ChannelFile:
@@ -215,6 +218,8 @@ def _recognize_archive(path: Path) -> Content:
         return _ZIP
     if "xl/workbook.xml" in names:
         return _WORKBOOK
+    if names and all(name.endswith(".npy") for name in names):
+        return _ARRAYS
     return _ZIP if "[Content_Types].xml" in names else _NO_WORKBOOK
 
 

@@ -17,7 +17,9 @@ from bowdenfit.files.channels import (
     refuse_too_large,
     to_floats,
 )
-from bowdenfit.files.clocks import assign_group_clocks, assign_interval_times, assign_only_clock
+from bowdenfit.files.clock_settings import assign_interval_times
+from bowdenfit.files.clocks import assign_group_clocks, assign_only_clock
+from bowdenfit.files.headings import unit_in_name
 
 MOST_COLUMNS = 64  # judged: a wider table is an image or a spectrum, no set of channels
 _LONGEST = 400  # characters of a path
@@ -27,8 +29,8 @@ _UNITS = ("unit", "units", "Unit", "Units")
 def read(path: Path) -> ChannelFile:
     """Read every numeric vector of an HDF5 file, and every column of its numeric tables, by path.
 
-    The unit comes from the attribute `unit` or `units`; the time from a time channel beside it, else from a sampling
-    rate (`rate`, `fs`, `sampling_rate` ...) among the attributes of the data set or of the groups around it.
+    The unit comes from the attribute `unit` or `units`, else from the name; the time from a time channel beside it, else from
+    a sampling rate (`rate`, `fs`, `sampling_rate` ...) among the attributes of the data set or of the groups around it.
 
     Raises:
         DatasetError: The file is damaged, too large or without numeric channels.
@@ -99,22 +101,22 @@ def _is_recording(dataset: Any, left_out: UnreadNames) -> bool:
 def _channels(dataset: Any, left_out: UnreadNames) -> Iterator[Channel]:
     """Yield the columns of a data set; the longer side of a table is the time."""
     name, unit = dataset.name.lstrip("/"), _unit(dataset)
-    values = dataset[()]
+    values, named = dataset[()], unit or unit_in_name(name)
     if values.dtype.names:
         yield from _fields(name, unit, values, left_out)
     elif values.ndim == 1 or min(values.shape) == 1:
-        yield Channel(name, unit, to_floats(values))
+        yield Channel(name, named, to_floats(values))
     else:
         tall = values.shape[0] >= values.shape[1]
         for number, column in enumerate(values.T if tall else values):
-            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", unit, to_floats(column))
+            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", named, to_floats(column))
 
 
 def _fields(name: str, unit: str, values: np.ndarray, left_out: UnreadNames) -> Iterator[Channel]:
     """Yield the numeric columns of a table whose rows are records."""
     for field in values.dtype.names or ():
         if values[field].ndim == 1 and is_numeric(values[field].dtype):
-            yield Channel(f"{name}.{field}", unit, to_floats(values[field]))
+            yield Channel(f"{name}.{field}", unit or unit_in_name(field), to_floats(values[field]))
         else:
             left_out.add(f"{name}.{field}", "they are text, complex numbers or objects")
 

@@ -12,11 +12,12 @@ from functools import lru_cache
 
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.clocks import names_time, unit_of_time
-from bowdenfit.files.spellings import parse_heading
+from bowdenfit.files.spellings import names_force, parse_heading
 from bowdenfit.units import ColumnSource, differing_units, is_unit, measures, weight_of
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")  # of a column, behind the name of its table
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 # `F_in` is no force in inches, nor `cell_A` one in ampere: behind a name only what cannot be a word counts as unit.
 _SUFFIXES = (
@@ -84,6 +85,11 @@ def heading_of(text: str, unit: str = "") -> Heading:
     if name and unit not in {"", "-", "1"} and is_unit(unit):
         return Heading(name, unit)
     return Heading(plain, _unit_behind(plain) or unit_of_time(plain))
+
+
+def unit_in_name(name: str) -> str:
+    """Return the unit in the last part of the name of a channel, such as "rec.F_in_N" or "bench/t_ms"; empty without one."""
+    return heading_of(re.split(r"[/.](?=[^/.]+$)", _INDEX.sub("", name))[-1]).unit
 
 
 def _unit_behind(heading: str) -> str:
@@ -218,19 +224,22 @@ def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--
 def rank_headings(headings: Sequence[tuple[str, str]], dimension: str) -> list[int]:
     """Return which columns may measure a dimension, the likeliest first: by their unit, by a weight, without one, others.
 
+    Of equal ones those with a word for a force come first, where that is the dimension and several have one.
+
     Args:
         headings: Heading of each column, and the unit that the file gives elsewhere; both may be empty.
         dimension: Such as "force".
     """
-    ranks = list[tuple[int, int]]()
+    ranks, named = list[tuple[int, bool, int]](), [names_force(heading) for heading, _ in headings]
+    by_name = dimension == "force" and named.count(True) > 1
     for i, (heading, below) in enumerate(headings):
         unit = heading_of(heading, below).unit
         fits = measures(unit, dimension)
         weighs = dimension == "force" and bool(weight_of(unit))
         rank = 0 if fits else 1 if weighs else 2 if not unit else 3
         if heading and (dimension == "time" or not names_time(heading) or parse_heading(heading, below)):
-            ranks.append((rank, i))
-    return [i for _, i in sorted(ranks)]
+            ranks.append((rank, by_name and not named[i], i))
+    return [i for _, _, i in sorted(ranks)]
 
 
 def unit_to_state(heading: str, below: str, usual: str) -> str:

@@ -27,6 +27,7 @@ from bowdenfit.files.sheet_rows import (
 from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.text_file import CsvRecord
 from bowdenfit.types import Vector
+from bowdenfit.units import is_unit
 from bowdenfit.words import shown
 
 _KINDS: tuple[Kind, ...] = ("number", "date", "text")
@@ -117,7 +118,7 @@ def read_headings(filled: Sequence[CsvRecord], position: int, place: str, groups
     if len(above) > 1 and not units and is_units(above[-1]) and _repeats(above[0]):  # names, units, and which end they are of
         units = [strip_brackets(cell) for cell in above[-1].cells]
         names, rows = _join_groups(above[0].cells, names), [*above, *rows]
-    elif above and (_is_over(above[-1], names, groups) or _completes(above[-1], names)):
+    elif above and (_is_over(above[-1], names, groups) or _completes(above[-1], names) or _names_units(above[-1], names)):
         names = _join_groups(drop_label(above[-1].cells), names)
         rows.insert(0, above[-1])
     return Headings(tuple(rows), header, tuple(names), tuple(units))
@@ -152,6 +153,13 @@ def _completes(above: CsvRecord, names: Sequence[str]) -> bool:
     written = [name.lower() for name in names if name]
     is_merged = is_words(above) and is_quantity and 0 < len(groups) < len(written) == len(set(written))
     return bool(alone) and (_repeats(above) or is_merged)
+
+
+def _names_units(above: CsvRecord, names: Sequence[str]) -> bool:
+    """Return whether a row of words has the name of each column whose heading is a unit in brackets alone, such as [deg]."""
+    pairs = zip([*above.cells, *[""] * len(names)], names, strict=False)
+    unnamed = [upper.strip() for upper, name in pairs if name != strip_brackets(name) and is_unit(strip_brackets(name))]
+    return bool(unnamed) and all(unnamed) and is_words(above)
 
 
 def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:

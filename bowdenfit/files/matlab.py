@@ -23,8 +23,10 @@ from bowdenfit.files.channels import (
     refuse_too_large,
     to_floats,
 )
-from bowdenfit.files.clocks import assign_group_clocks, assign_interval_times, assign_only_clock
+from bowdenfit.files.clock_settings import assign_interval_times
+from bowdenfit.files.clocks import assign_group_clocks, assign_only_clock
 from bowdenfit.files.hdf5 import iterate_members
+from bowdenfit.files.headings import unit_in_name
 
 MOST_COLUMNS = 64  # judged: a wider matrix is an image or a spectrum, no set of channels
 _TEXT = "they are text"
@@ -63,7 +65,8 @@ class _Variables:
         elif values.ndim > 2 or (values.ndim == 2 and min(values.shape) > MOST_COLUMNS):
             self.left_out.add(name, f"they have more than two dimensions or {MOST_COLUMNS} columns")
         else:
-            self.channels.extend(Channel(label, "", to_floats(column)) for label, column in _columns(name, values))
+            columns = _columns(name, values)
+            self.channels.extend(Channel(label, unit_in_name(label), to_floats(column)) for label, column in columns)
 
 
 def read(path: Path) -> ChannelFile:

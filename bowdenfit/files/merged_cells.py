@@ -27,7 +27,7 @@ def fill_merged_cells(
     filled, by_quantity = list[str](), dict(columns)
     for quantity in wanted:
         column = columns.get(quantity.name)
-        if column is not None and quantity.dimension in _REPEATED and not quantity.optional and _is_merged(column.cells):
+        if column is not None and quantity.dimension in _REPEATED and not quantity.optional and is_merged(column.cells):
             by_quantity[quantity.name] = replace(column, cells=_fill_down(column.cells))
             filled.append(shown(column.heading))
     if not filled:
@@ -37,7 +37,7 @@ def fill_merged_cells(
     return replace(table, lines=lines), by_quantity
 
 
-def _is_merged(cells: Sequence[Cell]) -> bool:
+def is_merged(cells: Sequence[Cell]) -> bool:
     """Return whether a column has at least two blocks, each a number over blank cells."""
     starts = [i for i, cell in enumerate(cells) if not cell.blank]
     follows = [i + 1 < len(cells) and cells[i + 1].blank for i in starts]

@@ -214,6 +214,11 @@ def names_length(heading: str) -> bool:
     return bool(_LENGTH_WORDS.search(without_accents(heading).lower()))
 
 
+def names_force(heading: str) -> bool:
+    """Return whether one of the words of a heading means force, in one of five languages: "field.wrench_in.force.z"."""
+    return any(_ROLES.get(word) == "force" for word in _split(_words(heading)))
+
+
 def without_accents(text: str) -> str:
     """Return letters without what stands above or below them."""
     letters = unicodedata.normalize("NFKD", text.replace("ß", "ss"))

@@ -22,6 +22,7 @@ from bowdenfit.files.channels import (
     truncation_error,
 )
 from bowdenfit.files.clocks import assign_group_clocks, assign_only_clock
+from bowdenfit.files.headings import unit_in_name
 
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 _WAVEFORM = "wf_increment"
@@ -102,7 +103,7 @@ def _whole_lengths(channels: list[Any], status: Any) -> dict[str, int]:
 def _channel(channel: Any, length: int) -> Channel:
     """Return one channel with the time of its waveform, if it has one."""
     raw = channel[:length]
-    unit = _unit(channel.properties)
+    unit = _unit(channel.properties) or unit_in_name(channel.name)
     if raw.dtype.kind == "M":
         return Channel(_name(channel), "s", _seconds(raw), start=_unix_time(raw[0]))
     time = _waveform_times(channel.properties, length) if _has_waveform(channel.properties) else None

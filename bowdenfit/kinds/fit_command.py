@@ -12,6 +12,7 @@ from bowdenfit.description.cable_parts import radius_setting
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.headings import find_candidates, heading_of, split_brackets
 from bowdenfit.files.pivot import find_pivot_headings
+from bowdenfit.files.spellings import names_force
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, find_stated_angle, guess_file_kind
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, FileColumn, LoneFile
 from bowdenfit.recordings.forces import likely_clock_unit
@@ -23,6 +24,7 @@ _SPREAD = re.compile(
 )
 _MOST_NAMED = 8  # judged: columns that may be meant instead, which are listed
 _STEPS = 60  # judged: rows that are enough to see a clock rise in even steps
+_BOTH_SIGNS = 0.2  # judged: share of positive readings above which, and of negative ones, a channel is no rope's
 _UNEVEN = 3.0  # judged: largest step of a clock over its smallest
 
 
@@ -214,8 +216,23 @@ def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]
     signals = [column for column in measured if units[column.name] and column.dimension in ("", "other", "ratio")]
     likely = list[FileColumn]()
     for group in (of_force, of_weight, of_torque, without_unit, [column for column in signals if column not in of_weight]):
-        likely += group if len(likely) < least else []
+        likely += _likeliest_first(group, least) if len(likely) < least else []
     return likely
+
+
+def _likeliest_first(columns: Sequence[FileColumn], least: int) -> list[FileColumn]:
+    """Return columns with those last that cannot be forces by their numbers or, if others can be by theirs, by their names."""
+    named = [column for column in columns if names_force(column.name)]
+    by_name = named if len(named) >= least else columns
+    return sorted(columns, key=lambda column: (not _pulls(column), column not in by_name))
+
+
+def _pulls(column: FileColumn) -> bool:
+    """Return whether the numbers of a column may be forces of a rope, which only pulls, rather than noise or a counter."""
+    if len(column.finite) < _STEPS:
+        return True
+    positive = np.count_nonzero(column.finite > 0) / len(column.finite)
+    return not _BOTH_SIGNS < positive < 1 - _BOTH_SIGNS and not bool(np.all(np.diff(column.finite) == 1))
 
 
 def make_ambiguity_error(file: LoneFile) -> DatasetError:

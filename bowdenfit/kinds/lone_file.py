@@ -19,6 +19,7 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock, names_time
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming, plain_name, split_brackets
 from bowdenfit.files.layout import is_index
+from bowdenfit.files.merged_cells import is_merged
 from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, names_length, parse_heading
 from bowdenfit.files.tables import RawTable, list_sheets, read_table
@@ -368,7 +369,9 @@ def _columns_of_table(table: RawTable) -> tuple[FileColumn, ...]:
             continue
         cells, values = [row[i] for row in table.rows], np.array(read_numbers(table, i))
         is_time, unit = names_time(heading) and not parse_heading(heading, below), _find_unit(heading, below)
-        are_numbers = not is_time and 2 * np.count_nonzero(np.isfinite(values)) > len(cells)
+        is_merged_angle = likely_wrap_angle(heading, below) is not None and is_merged(cells)
+        least = sum(not cell.blank for cell in cells) if is_merged_angle else len(cells)
+        are_numbers = not is_time and 2 * np.count_nonzero(np.isfinite(values)) > least
         ends = [" ".join(cell.text.split()) for cell in (cells[0], cells[-1])] if cells else ["", ""]
         different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
         valid_unit = unit if unit and is_unit(unit) else ""
@@ -387,4 +390,5 @@ def _column_of_channel(channel: Channel, times_others: bool) -> FileColumn:
     unit = channel.unit or heading_of(channel.name).unit
     ends = ["".join(f"{value:.5g}" for value in part) for part in (channel.values[:1], channel.values[-1:])]
     different, is_time = len(channel.values), times_others or is_clock(channel)
-    return FileColumn(channel.name, channel.unit, unit, channel.values, True, is_time, different, 0, *ends)
+    valid_unit = unit if unit and is_unit(unit) else ""
+    return FileColumn(channel.name, channel.unit, valid_unit, channel.values, True, is_time, different, 0, *ends)

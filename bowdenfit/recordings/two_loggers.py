@@ -218,7 +218,7 @@ def _scan(raw: RawRecording, settings: Preparation) -> ShiftScan:
     """Compare the output with what the play operator makes of the input, at every shift."""
     for name, force in (("input_force", raw.input_force), ("output_force", raw.output_force)):
         if settings.tare != "interval":
-            check_sign(raw.file, name, force)
+            check_sign(raw, name, force)
     return scan_shifts(raw.input_time, raw.input_force, raw.output_time, raw.output_force, _MOST_POINTS)
 
 

@@ -141,6 +141,17 @@ def test_merged_headings_that_complete_each_other_are_joined_and_statistics_of_b
     assert read_table(write(tmp_path, text)).header == ("", "Fin (N)", "Fout (N)")  # words over a column of numbers are none
 
 
+def test_names_over_units_in_brackets_and_the_ends_are_joined_and_merged_angles_proposed(tmp_path, run):
+    path = save_blocks(tmp_path, ("Angle", "Forces", ""), ("[deg]", "in [N]", "out [N]"))
+    assert read_table(path).header == ("Angle [deg]", "Forces in [N]", "Forces out [N]")
+    code, out, _ = run("check", path)
+    assert code == 2 and "--column wrap_angle='Angle [deg]'" in out
+    (forces,) = bf.read(path, columns=["wrap_angle=Angle [deg]"]).measurements.tables
+    np.testing.assert_allclose(np.degrees(np.nansum(forces.own.angle, axis=1)), np.repeat([90, 180, 270], 3))
+    untouched = "Bench B,,\nangle [deg],Fin [N],Fout [N]\n90,30,24\n180,30,20\n"
+    assert read_table(write(tmp_path, untouched)).header == ("angle [deg]", "Fin [N]", "Fout [N]")
+
+
 def test_headings_of_a_table_may_be_the_last_comment_over_it(tmp_path):
     body = "".join(f"  {angle:6.1f}  {30 * np.exp(0.12 * np.radians(angle)):8.3f}  30.000\n" for angle in (90, 180, 270, 360))
     table = read_table(write(tmp_path, "# sheath: PTFE\n# angle[deg]   Fin[N]   Fout[N]\n" + body, "log.dat"))

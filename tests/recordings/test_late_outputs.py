@@ -60,3 +60,13 @@ def test_half_a_period_of_equal_cycles_is_asked_about_with_the_option_that_state
         inspected(wave="sine", delay=3.0, first=1000)
     for part in ("about as well", "repeats itself", "--set 'tables.recordings.prepare.delay={value=", 'unit="s"}'):
         assert part in str(refused.value)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_a_cell_that_is_tared_in_between_is_no_late_output(share):
+    """Shifted by whole periods the part before the jump explains all of the output that is left."""
+    columns = channels(RecordedBench(rate=50, length=60, wave="sine", period=6.0), np.random.default_rng(0))
+    time, force, output = (columns[name] for name in ("time_s", "input_force_N", "output_force_N"))
+    force = force - 0.1 * np.ptp(force) * (time > share * 60)
+    delay = inspect_recording(RawRecording("s", "s.csv", time, force, time, output), Preparation()).delay
+    assert abs(delay.value) < 0.25 and "later than the input, which" not in delay.remark

@@ -166,7 +166,7 @@ def test_the_wrong_sign_is_refused_and_can_be_turned(columns, refuse, accept, tm
     columns["input_force_N"] = -columns["input_force_N"]
     path = write(tmp_path / "run.csv", columns)
     message = refuse("check", *alone(path))
-    for part in ("run.csv", "input_force", "negative", "sign convention", "--channel input_force=NAME:-N"):
+    for part in ("run.csv", "input_force", "negative", "sign convention", "--channel input_force=input_force_N:-N"):
         assert part in message
     assert "0.30" in accept("check", *alone(path), "--channel", "input_force=input_force_N:-N")
 

@@ -104,6 +104,11 @@ def workbook(path: Path) -> None:
     book.save(path)
 
 
+def arrays(path: Path) -> None:
+    """An archive of NumPy, compressed, with an object and a word."""
+    np.savez_compressed(path, **FORCES, cells=np.array([LOAD, "a"], dtype=object), word="a")
+
+
 def parquet(path: Path) -> None:
     """Parquet in two row groups, with a column of timestamps and one of words."""
     columns = {**FORCES, "stamp": pyarrow.array(range(N), pyarrow.timestamp("ms")), "word": ["a"] * N}
@@ -189,7 +194,7 @@ def archive(path: Path) -> None:
 WRITERS: dict[str, Callable[[Path], None]] = {
     "plain.mat": matlab, "packed.mat": packed_matlab, "old.mat": old_matlab, "modern.mat": modern_matlab, "a.h5": hdf5,
     "a.tdms": tdms, "a.mf4": mdf, "a.xlsx": workbook, "a.parquet": parquet, "a.bag": bag1, "a.db3": db3, "a.mcap": mcap,
-    "a.cmbl": logger_pro, "a.csv": table, "german.txt": german_table, "zip.xlsx": archive,
+    "a.npz": arrays, "a.cmbl": logger_pro, "a.csv": table, "german.txt": german_table, "zip.xlsx": archive,
 }  # fmt: skip
 
 

@@ -32,8 +32,6 @@ _FEWEST = 4  # degrees of freedom from which scatter estimates the noise, to abo
 _USUAL_NOISE, _USUAL_FREEDOM = 0.02 * np.sqrt(2), 6.0
 _TRUNCATED = 1.8  # sd of a normal over that of either half: 1 / sqrt(1 - 2 / pi) = 1.66, and 8 % for estimating it
 _LEAST_FOR_LINE = 3  # readings of a cell above which a line with two coefficients leaves some freedom
-
-
 # An output does not follow the input where its slope is surely below half of a rope's least, and the input explains less than
 # a quarter of its variance. Judgements, by which none of 3000 noisy benches is refused (tests/kinds/forces/test_following.py).
 _WIDE = 0.3  # standard deviation of the loads of a run over their mean, from which the slope is looked at
@@ -46,7 +44,7 @@ _SDS = 3.0  # standard deviations of stated errors of the load cells that are al
 _MOSTLY = 0.5  # share of the rows of a stroke from which a mistake is the whole table's
 _MIXED = 0.2, 0.8  # shares of gaining rows between which a table of one stroke may hold both
 _ABOUT = 0.3  # least median loss of the other rows, over the median gain, where both strokes are in a table
-_FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # units that are mistaken for each other
+_FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N (or N and mN)": 1000.0}  # units mistaken for each other
 _LEAST, _MOST = 0.15, 1.02  # efficiencies that a cable may have once the unit is right
 _NO_SWAP = 2.5  # output over input above which a unit is likelier than swapped columns of a cable below 40 %
 _SLIGHT = 0.1  # log gain of force that load cells may differ by
@@ -311,11 +309,13 @@ def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, Log
 
 def _allowed_gain(force_in: Vector, force_out: Vector, description: Description) -> Vector:
     """Return what errors of gain and zero of the load cells may add to each log ratio [1]."""
-    sensors, zero = description.sensors, _ZERO_ERROR * max(force_in.max(), force_out.max())
+    sensors, largest = description.sensors, max(force_in.max(), force_out.max())
+    # No cell is made for more than its rope may have, whatever a wrong unit makes of the other.
+    zero_in, zero_out = (_ZERO_ERROR * min(largest, force.max() / _LEAST) for force in (force_in, force_out))
     of_gain = GAIN_ERROR if sensors.gain_sd is None else _SDS * sensors.gain_sd
     if sensors.offset_sd is not None:
-        zero = _SDS * sensors.offset_sd.to("force")
-    return of_gain + zero * np.sqrt(1 / force_in**2 + 1 / force_out**2)
+        zero_in = zero_out = _SDS * sensors.offset_sd.to("force")
+    return np.asarray(of_gain + np.hypot(zero_in / force_in, zero_out / force_out))
 
 
 def _refuse_gains(table: ForceTable, gains: ForceGains) -> NoReturn:

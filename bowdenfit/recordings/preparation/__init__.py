@@ -221,7 +221,7 @@ def _clean(raw: RawRecording, settings: Preparation) -> _Cleaned:
     ]
     for name, channel in zip(names, channels, strict=True):
         if not raw.loop:
-            check_sign(raw.file, name, channel.force)
+            check_sign(raw, name, channel.force)
     ends = max(e[0] for _, e in flagged), min(e[1] for _, e in flagged)
     return _Cleaned(channels[0], channels[1], ends, (tares[0][0], tares[1][0]), (tares[0][1], tares[1][1]))
 
@@ -314,6 +314,8 @@ def _find_late_output(
     lasting = slice(*np.searchsorted(common.time, limits).tolist())  # what has a partner with the delay and without
     if _scan(common, ends, lasting, _ALL).late_output(is_beyond=is_beyond) is None:
         return None  # something else than the delay differs between the parts of the recording
+    if abs(late.delay) > scan.near and any(_scan(common, ends, part, _ALL).follows for part in _thirds(common)):
+        return None  # as where one cell was tared in between, which the rest does not share
     if late.rival is not None:
         raise DatasetError(
             f"{raw.file}: in {raw.name!r} the output follows the input if it is {late.delay:.3g} s late, and about as well if "
@@ -323,6 +325,12 @@ def _find_late_output(
             "record a pause before the first stroke."
         )
     return late
+
+
+def _thirds(common: CommonClock) -> list[slice]:
+    """Return three parts of a recording of equal length, of which a single event leaves two as they are."""
+    ends = [0, *(len(common.time) * part // 3 for part in (1, 2)), len(common.time)]
+    return [slice(begin, end) for begin, end in pairwise(ends)]
 
 
 def _is_opposed(common: CommonClock, good: Flags) -> bool:

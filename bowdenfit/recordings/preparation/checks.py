@@ -1,5 +1,7 @@
 """What a recording must be before anything is computed from it; each refusal is a sentence with a remedy."""
 
+import shlex
+
 import numpy as np
 
 from bowdenfit.errors import DatasetError
@@ -55,11 +57,11 @@ def check_channels(raw: RawRecording) -> tuple[str, ...]:
     return tuple(dict.fromkeys(r for r in remarks if r))
 
 
-def check_sign(file: str, name: str, force: Vector) -> None:
+def check_sign(raw: RawRecording, name: str, force: Vector) -> None:
     """Refuse a channel most of whose readings under load are negative; call it once the tare is subtracted.
 
     Args:
-        file: File name, for the error.
+        raw: The recording, which knows the names of its file and channels.
         name: Channel, "input_force" or "output_force".
         force: Its readings [N].
 
@@ -67,7 +69,7 @@ def check_sign(file: str, name: str, force: Vector) -> None:
         DatasetError: More than half of the readings above a fifth of the largest are negative.
     """
     low, high = _measure_range(force)
-    _refuse_missing_code(file, name, force, low, high)
+    _refuse_missing_code(raw.file, name, force, low, high)
     largest, loaded, below = max(abs(low), abs(high)), 0, 0
     for part in split_pieces(len(force)):
         some = to_floats(force, part)
@@ -75,10 +77,12 @@ def check_sign(file: str, name: str, force: Vector) -> None:
         loaded, below = loaded + len(under_load), below + int(np.count_nonzero(under_load < 0))
     negative = below / max(loaded, 1)
     if negative > 0.5:
+        channel = raw.channels[name == "output_force"] or "NAME"
         raise DatasetError(
-            f"{file}: {100 * negative:.0f} % of the readings of {name} under load are negative, down to "
+            f"{raw.file}: {100 * negative:.0f} % of the readings of {name} under load are negative, down to "
             f"{low:.4g} N, but a rope can only pull; the usual cause is the sign convention of the load cell. "
-            f"Turn the sign by mapping the channel with a minus before its unit, such as --channel {name}=NAME:-N."
+            f"Turn the sign by mapping the channel with a minus before its unit, such as --channel "
+            f"{shlex.quote(f'{name}={channel}:-N')}."
         )
 
 

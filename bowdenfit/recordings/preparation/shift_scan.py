@@ -83,6 +83,12 @@ class ShiftScan:
         """What the best shift within the range of `delay` leaves unexplained."""
         return float(np.min(self.unexplained, where=np.abs(self.shift) <= RANGE, initial=1.0))
 
+    @property
+    def follows(self) -> bool:
+        """Whether the output follows the input within the range of `delay`, about as well as at any other shift."""
+        least = self.best[1]
+        return least <= _FOLLOWED and self.usual < _MUCH_BETTER * least
+
     def rival(self) -> float | None:
         """Return another shift that fits about as well as the best, with worse ones between them; None if there is none."""
         as_well = self.unexplained < AS_WELL * self.best[1]

@@ -322,6 +322,16 @@ def test_the_command_names_the_likeliest_columns_and_never_a_placeholder(run, tm
     assert code == 2 and run("check", *words[1:])[0] == 0
 
 
+def test_neither_a_counter_nor_noise_about_zero_is_proposed_as_a_force(run, tmp_path):
+    time, force, output = recorded()
+    headings = ("time (s)", "in.header.seq", "in.force.x", "in.force.z", "temperature", "out.force.z")
+    columns = (time, range(412, 412 + len(time)), np.sin(7 * time) / 50, force, 0 * time + 21.5, output)
+    _, out, _ = run("check", write(tmp_path, headings, columns))
+    (words,) = command(out)
+    assert words[-4:] == ["--channel", "input_force=in.force.z:N", "--channel", "output_force=out.force.z:N"]
+    assert run("check", *words[1:])[0] == 0
+
+
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "s"), (1000.0, "ms")])
 def test_columns_without_headings_are_named_by_place_and_one_that_rises_evenly_is_the_clock(run, tmp_path, scale, unit):
     time, force, output = recorded()

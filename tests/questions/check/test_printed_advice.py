@@ -55,6 +55,17 @@ def test_a_table_of_one_stroke_with_more_out_than_in_is_told_of_ratios_too(tmp_p
         bf.read(path, wrap_angle="60deg")
 
 
+def test_an_output_in_millinewtons_under_a_heading_in_newtons_is_named_by_its_unit(tmp_path):
+    angle, force_in = np.repeat([90, 180, 270], 5), np.tile(LOADS, 3)
+    force_out = (1000 * force_in * np.exp(-MU * np.radians(angle))).round()
+    path = write(tmp_path, "wrap_angle_deg,input_force_N,output_force_N", angle, force_in, force_out)
+    with pytest.raises(bf.DatasetError, match=r"15 of 15 rows.*unit in one heading.*N and mN"):
+        bf.read(path)
+    assert coefficient(write(tmp_path, "wrap_angle_deg,input_force_N,output_force_mN", angle, force_in, force_out)) == (
+        pytest.approx(MU, rel=0.01)
+    )
+
+
 @pytest.mark.parametrize("heading", ["Bends", "No. of 90 deg bends", "Number of bends"])
 def test_a_count_of_bends_is_not_taken_for_an_angle(tmp_path, run, heading):
     count = np.repeat([1, 2, 3], 5)

@@ -98,6 +98,11 @@ def unused_points(unused: Sequence[UnusedRow], place: Callable[[UnusedRow], tupl
     return made
 
 
+def forces_of(row: UnusedRow) -> tuple[float, float]:
+    """Return input and output force of a row that is not used."""
+    return row.values.get("input_force", np.nan), row.values.get("output_force", np.nan)
+
+
 def row_places(table: ForceRows, description: Description) -> tuple[str, Vector]:
     """Return the axis along which readings are drawn, and where each row is: its length, its wrap angle, or nothing."""
     route = description.route

@@ -5,7 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from bowdenfit.addons.app.measured_rows import UnusedRow
-from bowdenfit.addons.app.points import INPUT, MOST_POINTS, OUTPUT, Drawers, Points, by_stroke, make_chart
+from bowdenfit.addons.app.points import (
+    INPUT,
+    MOST_POINTS,
+    OUTPUT,
+    Drawers,
+    Points,
+    by_stroke,
+    forces_of,
+    make_chart,
+    unused_points,
+)
 from bowdenfit.dataset import Dataset
 from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.pages.section import Chart
@@ -18,9 +28,9 @@ _MOST_RECORDINGS = 24  # on a page, as in the report
 
 def _draw_loop(table: LoopTable, dataset: Dataset, unused: Sequence[UnusedRow]) -> list[Chart]:
     """Return output against input force of a pull-pull loop."""
-    del dataset, unused
+    del dataset
     shown = by_stroke(table.input_force, table.output_force, table.stroke, table.origin, _LOOP_STROKES)
-    return [make_chart("Output against input force", INPUT, OUTPUT, shown)]
+    return [make_chart("Output against input force", INPUT, OUTPUT, [*shown, *unused_points(unused, forces_of)])]
 
 
 def _draw_recordings(table: Recordings, dataset: Dataset, unused: Sequence[UnusedRow]) -> list[Chart]:

@@ -118,6 +118,16 @@ def test_the_curves_that_would_be_fitted_follow_the_angles():
         assert np.interp(length, group.x, group.series[column].values) == pytest.approx(angle, abs=3)
 
 
+def test_rows_that_are_left_out_are_drawn_in_every_table_of_a_loop(tmp_path):
+    folder = shutil.copytree(DATASETS / "synthetic-haptic-loop", tmp_path / "loop")
+    kinds = [file.kind for file in collect_rows(folder).files]
+    for kind in kinds:
+        exclude_row(folder, kind, f"{kind}.csv", 4, "the rope jumped")
+    for picture in make_pictures(collect_rows(folder)):
+        assert [key for _, _, key in points_of([picture], "Left out by you")] == [f"4 {picture.name[5:]}.csv"]
+    assert {"stretch", "preload", "loop"} <= {*kinds}
+
+
 @pytest.mark.parametrize(
     "name", ["synthetic-recordings", "synthetic-haptic-loop", "synthetic-bench", "yarn-on-cylinder", "synthetic-catheter"]
 )
@@ -143,6 +153,9 @@ def test_a_ring_down_is_drawn_over_the_time_from_its_release(tmp_path):
     assert chart.y_label == "Angle (deg)" and group.x[0] == 0 and group.x[-1] == pytest.approx(0.249)
     assert group.series[0].values == pytest.approx(np.rad2deg(angle), abs=1e-3)
     assert group.series[0].keys[0] == row_key("ringdown.csv", 2)
+    exclude_row(tmp_path, "ringdown", "ringdown.csv", 12, "bumped")
+    (place,) = points_of([p for p in make_pictures(collect_rows(tmp_path)) if p.name == "data-ringdown"], "Left out by you")
+    assert place == (pytest.approx(0.010), pytest.approx(np.rad2deg(angle[10]), abs=1e-3), "12 ringdown.csv")
 
 
 def test_a_reason_is_needed(bench):

@@ -45,7 +45,8 @@ def make_pictures(
 
 def _caption(charts: Sequence[Chart], unused: Sequence[UnusedRow], can_change: bool) -> str:
     """Say what a picture shows, and what a click does."""
-    labels = [series.label for chart in charts[:1] for group in chart.groups for series in group.series for _ in group.x]
+    shown = (series for chart in charts for group in chart.groups for series in group.series if series.label in _MARKS)
+    labels = [label for label, _ in {(series.label, key) for series in shown for key in series.keys}]
     sentences = ["As measured, before any fit."]
     sentences += [f"{words}: {labels.count(label)}." for label, words in _MARKS.items() if label in labels]
     missing = len(unused) - sum(labels.count(label) for label in _MARKS)

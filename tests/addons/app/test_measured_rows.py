@@ -44,6 +44,16 @@ def points_of(pictures, label):
     return sorted((float(x), float(y), key) for some in places for x, y, key in some)
 
 
+def test_a_row_that_is_refused_counts_once_though_it_is_several_points(tmp_path):
+    folder = shutil.copytree(DATASETS / "on-body-exoskeleton", tmp_path / "on-body")
+    text = (folder / "angles.csv").read_text().replace("450,30,11", "450,-30,11")
+    (folder / "angles.csv").write_text(text)
+    with pytest.raises(BowdenfitError) as refusal:
+        bf.check(folder)
+    pictures = make_pictures(collect_rows(folder, list_refusals(refusal.value)))
+    assert len(points_of(pictures, "Refused")) == 2 and "Red, refused: 1." in pictures[0].chart_caption
+
+
 def test_every_reading_is_a_point_that_is_called_as_its_row(bench):
     measured = collect_rows(bench)
     table = bf.read(bench).measurements.table(ForceTable)

@@ -116,3 +116,29 @@ def test_files_are_drawn_while_they_are_added_and_refused_rows_are_red(chromium,
         refused.wait_for()
         assert refused.get_attribute("data-row-key") == "7 b.csv" and "'slip' is not a number" in refused.inner_text()
         assert faults_of(page) == []
+
+
+DRAW_BOX = """() => {
+  document.querySelector("[data-key=probe]")?.remove();
+  const box = Object.assign(document.createElement("input"), { type: "text" });
+  box.dataset.key = "probe";
+  box.addEventListener("change", event => { globalThis.told = event.target.value; });
+  globalThis.told = null;
+  document.querySelector("main").append(box);
+}"""
+
+
+def test_what_is_being_typed_stays_when_a_part_is_drawn_again_and_is_told_when_it_is_left(chromium, tmp_path):
+    with served(tmp_path) as app, visiting(chromium, app) as visit:
+        page, box = visit.page, visit.page.locator("[data-key=probe]")
+        page.evaluate(DRAW_BOX)
+        box.press_sequentially("180")
+        page.evaluate(DRAW_BOX)
+        page.wait_for_function("document.activeElement.value === '180'")
+        assert page.evaluate("globalThis.told") is None
+        page.keyboard.press("Tab")
+        page.wait_for_function("globalThis.told === '180'")
+        box.focus()
+        page.evaluate(DRAW_BOX)
+        page.wait_for_function("document.activeElement.dataset.key === 'probe'")
+        assert box.input_value() == "", "what was told is not kept"

@@ -59,11 +59,11 @@ def click_on_line(page, figure, x):
     """Click down a chart at a place of its axis, twice in each row of pixels that a line may cross, until the form follows."""
     box = page.locator(f"{figure} .u-over").first.bounding_box()
     low, high = map(float, page.locator(f"{figure} .chart").first.get_attribute("data-shown").split())
-    before = page.locator("#leave-out").inner_html()
+    unchanged = page.locator("#leave-out").inner_html()
     for y in range(4, int(box["height"]), 12):
         page.mouse.click(box["x"] + box["width"] * (x - low) / (high - low), box["y"] + y)
         page.wait_for_timeout(60)
-        if page.locator("#leave-out").inner_html() != before:
+        if page.locator("#leave-out").inner_html() != unchanged:
             return
     raise AssertionError(f"no line at {x}")
 

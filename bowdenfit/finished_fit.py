@@ -5,6 +5,7 @@ from dataclasses import fields
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
+from warnings import warn
 
 from bowdenfit.arguments import Quantity, number_with_unit
 from bowdenfit.display import Block, Rows, blocks_of
@@ -44,6 +45,7 @@ from bowdenfit.questions.summary.page import Summary, summarize
 from bowdenfit.questions.summary.verdict import Verdict, assess_fit
 from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES
+from bowdenfit.results.data_changes import find_data_changes
 from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
@@ -205,12 +207,15 @@ class Fit(Record):
 
 
 def load(path: str | Path) -> Fit:
-    """Load a fit from its results folder, bit for bit as it was saved.
+    """Load a fit from its results folder, bit for bit as it was saved, and warn if its data have changed since.
 
     Raises:
         StoreError: The folder is missing, unfinished or damaged.
     """
-    return Fit.load(path)
+    fit = Fit.load(path)
+    if outdated := find_data_changes(Path(path)).describe(f"the fit {path}"):
+        warn(outdated, stacklevel=2)
+    return fit
 
 
 class FigureMethods:

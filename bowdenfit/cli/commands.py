@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import version
@@ -34,7 +34,7 @@ from bowdenfit.cli.terminal import NoReaderError, say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES, read_answers
-from bowdenfit.results.data_changes import find_data_changes
+from bowdenfit.results.data_changes import DataChanges, find_data_changes
 from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.results.folder import refuse_unwritable
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
@@ -58,6 +58,7 @@ LOOK: dict[str, Any] = {  # of every command
 }
 
 
+_CHANGED = "changed_since_fit"  # key of --json
 _READING_PARAMETERS = parse(Reading.__doc__ or "").params  # which several verbs share
 
 
@@ -161,18 +162,19 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
         key = COEFFICIENT_TROUBLES if verb.needs_coefficients else TROUBLES
         troubles = answers[key] if key in answers else _list_troubles(request[first], source, verb.needs_coefficients)
         reply = _add_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
-    reply = replace(reply, notes=(*reply.notes, *_describe_data_changes(source)))
-    _print_answer(reply, form)
-    for note in reply.notes:
+    changes = _find_data_changes(source)
+    notes = [of_fit.describe(f"the fit {folder}") for folder, of_fit in changes.items()]
+    _print_answer(reply, form, {str(folder): list(of_fit.files) for folder, of_fit in changes.items()})
+    for note in (*reply.notes, *notes):
         say(note, err=True)
     return reply.exit_code
 
 
-def _print_answer(reply: Reply, form: str) -> None:
-    """Print an answer for people, or as "json" or "csv"."""
+def _print_answer(reply: Reply, form: str, changed: dict[str, list[str]] | None = None) -> None:
+    """Print an answer for people, or as "json" or "csv"; `changed` are the files that have changed since, by fit."""
     for piece in reply.pieces:
         say(piece, nl=False)
-    say(_to_json(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
+    say(_to_json(reply, changed) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
 
 
 def _refuse_flags_of_others(flags: str) -> None:
@@ -257,28 +259,33 @@ def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Repl
     return replace(reply, notes=(*reply.notes, warning), exit_code=reply.exit_code or NOT_TRUSTED) if troubles else reply
 
 
-def _describe_data_changes(source: Any) -> Iterator[str]:
-    """Yield which data have changed since each of the fits that a verb was asked of."""
-    for folder in source if isinstance(source, tuple | list) else (source,):
-        is_fit = isinstance(folder, Path) and (folder / FIT_FILE).is_file()
-        if is_fit and (words := find_data_changes(folder).describe(f"the fit {folder}")):
-            yield words
+def _find_data_changes(source: Any) -> dict[Path, DataChanges]:
+    """Return what changed since each of the fits that a verb was asked of, of those whose data have changed."""
+    folders = source if isinstance(source, tuple | list) else (source,)
+    fits = [folder for folder in folders if isinstance(folder, Path) and (folder / FIT_FILE).is_file()]
+    return {folder: changes for folder in fits if (changes := find_data_changes(folder)).files}
 
 
-def _to_json(reply: Reply) -> str:
-    """Return an answer as JSON."""
-    return json.dumps(results.plain_data(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
+def _to_json(reply: Reply, changed: dict[str, list[str]] | None) -> str:
+    """Return an answer as JSON, with the files that have changed since each fit, if any have; in each row of several."""
+    if reply.page is None:
+        return reply.text
+    answer = results.plain_data(reply.page())
+    for part in answer if isinstance(answer, list) else [answer]:
+        if changed and isinstance(part, dict):
+            part[_CHANGED] = changed
+    return json.dumps(answer, indent=1, allow_nan=False) + "\n"
 
 
 def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
     """Load one fit, or several by folder name (by path from the common folder where two names are equal)."""
     if isinstance(results, Path):
-        return bf.load(results)
+        return bf.Fit.load(results)
     names = [folder.name for folder in results]
     paths = [folder.resolve() for folder in results]
     above = Path(os.path.commonpath(paths)) if len(set(paths)) > 1 else Path(paths[0].anchor)
     return {
-        name if names.count(name) == 1 or path == above else str(path.relative_to(above)): bf.load(folder)
+        name if names.count(name) == 1 or path == above else str(path.relative_to(above)): bf.Fit.load(folder)
         for name, path, folder in zip(names, paths, results, strict=True)
     }
 

@@ -41,18 +41,25 @@ class ExcludedRows(Frozen):
 
 
 class ExcludedSpan(Frozen):
-    """A stretch of a recording that its user leaves out, in seconds of the recording's clock, and why."""
+    """A stretch of a recording that its user leaves out, in seconds of the recording's clock, or all of it; and why."""
 
-    start: Finite
-    end: Finite
+    start: Finite | None = None
+    end: Finite | None = None
     reason: Annotated[Text, Field(min_length=1)]
     file: str | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> "ExcludedSpan":
-        if not self.start < self.end:
+        if (self.start is None) != (self.end is None):
+            raise ValueError("a stretch that is left out needs start and end, in seconds; without both all of the file is")
+        if self.start is not None and self.end is not None and not self.start < self.end:
             raise ValueError("a stretch that is left out must start before it ends; start and end are in seconds")
         return self
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """Start and end [s]; None if all of the file is left out."""
+        return None if self.start is None or self.end is None else (self.start, self.end)
 
 
 class Table(TableSettings):

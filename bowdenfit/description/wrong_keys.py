@@ -17,6 +17,8 @@ _FEWER = {
     "choices": "name the lengths that can be bought, or leave them out and take the best length of all",
     "recording": "fit the recordings of each cable by themselves",
 }
+_TIMES = ("delay", "clock_shift", "block")
+_LITERAL = "literal["  # as pydantic calls the words among the alternatives of a key
 _ALIKE = 0.5  # judged: difflib's likeness from which an unknown key is taken for a misspelled one
 _LONGEST_KEY = 80  # letters that are said of one
 _LARGE = 1e15  # a number that nobody measures
@@ -84,6 +86,8 @@ def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
 def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str, units: Mapping[str, str]) -> str:
     """Return what is wrong with one key."""
     where = [str(part) for part in error["loc"]]
+    is_alternative = bool(where) and where[-1].startswith(_LITERAL)  # words in place of a quantity
+    where = where[:-1] if is_alternative else where
     parts = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
     place = f"{file}, {'.'.join(parts)}" if where else file
     if error["type"] == "extra_forbidden":
@@ -104,6 +108,8 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     if where == ["schema"] and isinstance(error["input"], int) and error["input"] > SCHEMA:
         message = f"schema {shown(error['input'])} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
     value = f" (found {shown(error['input'])})" if not isinstance(error["input"], dict | list) and where else ""
+    if is_alternative:
+        message += f", or a number with its unit, such as {_with_unit(None, where, units)}"
     sentence = f"{place}: {message[:1].lower() + message[1:]}{value}"
     return sentence if sentence.endswith((".", "?")) else f"{sentence}."
 
@@ -122,6 +128,7 @@ def _with_unit(value: Any, where: Sequence[str], units: Mapping[str, str]) -> st
     number = value if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGE else 20
     key = ".".join(where)
     unit = units.get(key, "mm")
+    unit = "ms" if where[-1] in _TIMES else unit
     unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else unit
     return f'{{ value = {number}, unit = "{unit}" }}'
 

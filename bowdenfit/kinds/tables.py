@@ -39,14 +39,16 @@ class Measurements(Display):
         """Return the table of a class; None if nothing of that kind was measured."""
         return next((table for table in self.tables if type(table) is of), None)
 
-    def excluded_points(self, kind: str, x: str, y: str) -> np.ndarray:
+    def excluded_points(self, kind: str, x: str, y: str, run: int | None = None) -> np.ndarray:
         """Return two quantities of the readings that the user leaves out, of those that have both; one row each.
 
         Args:
             kind: Name of their kind.
             x, y: Names of the quantities.
+            run: Number of the run that they are of, where their kind tells; of any run if omitted.
         """
-        readings = (reading.values for reading in self.excluded.get(kind, ()))
+        of_all = (reading.values for reading in self.excluded.get(kind, ()))
+        readings = [values for values in of_all if run is None or values.get("run") == run]
         return np.array([(values[x], values[y]) for values in readings if x in values and y in values]).reshape(-1, 2).T
 
     def with_tables(self, *tables: Any) -> "Measurements":

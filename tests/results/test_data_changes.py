@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import bowdenfit as bf
 from bowdenfit.results.data_changes import DataChanges, find_data_changes, locate_data_set
 
 DATASETS = Path(__file__).parents[2] / "datasets"
@@ -103,3 +104,22 @@ def test_commands_that_read_a_fit_name_the_data_that_have_changed(run, bench, qu
     assert printed.count("Changed since") == len([word for word in arguments if word.startswith("fits/")])
     if words.startswith("report"):
         assert "Changed since this fit" in (bench / "fits" / "on-body" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("words", ["length FIT", pytest.param("predict FIT 470", marks=pytest.mark.extended)])
+def test_programs_are_told_as_well(run, bench, quick_results, words):
+    results = shutil.copytree(quick_results, Path("fits") / "on-body")
+    shutil.copytree(bench / "measured" / "on-body", "on-body")
+    arguments = words.replace("FIT", str(results)).split()
+
+    def parts():
+        answer = json.loads(run(*arguments, "--json")[1])
+        return answer if isinstance(answer, list) else [answer]
+
+    bf.load(results)  # a warning is an error here
+    assert not any("changed_since_fit" in part for part in parts())
+    Path("on-body", "angles.csv").write_text("changed")
+    assert all(part["changed_since_fit"] == {"fits/on-body": ["angles.csv"]} for part in parts())
+    with pytest.warns(UserWarning, match=r"^Changed since the fit fits/on-body: 'angles\.csv'") as warned:
+        bf.load(results)
+    assert [Path(warning.filename) for warning in warned] == [Path(__file__)]

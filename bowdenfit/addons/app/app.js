@@ -33,12 +33,28 @@
     row.scrollIntoView({ block: "center" });
     row.focus({ preventScroll: true });
   });
-  let last = null;
-  document.addEventListener("focusin", event => { last = event.target.dataset?.key ?? null; });
+  // A part that is drawn anew keeps the focus, and what is being typed into it, which is told when it is left.
+  let last = null, typed = null;
+  document.addEventListener("focusin", event => {
+    if (event.target.dataset?.key !== last) typed = null;
+    last = event.target.dataset?.key ?? null;
+  });
+  document.addEventListener("input", event => { if (event.target.matches("input[type=text]")) typed = event.target.value; });
+  document.addEventListener("change", event => {
+    const box = event.target; // which a browser tells of a box that is taken away too, where nobody listens any more
+    requestAnimationFrame(() => { if (box.isConnected) typed = null; });
+  }, true);
+  const restore = control => {
+    control.focus({ preventScroll: true });
+    if (typed === null || !control.matches("input[type=text]")) return;
+    control.value = typed;
+    control.addEventListener("blur", () => { if (typed !== null) control.dispatchEvent(new Event("change", { bubbles: true })); }, { once: true });
+  };
   const tidy = () => {
     globalThis.drawCharts?.();
     document.querySelector("main.q-page")?.setAttribute("role", "none"); // NiceGUI's own, around ours
-    if (last && document.activeElement === document.body) document.querySelector(`[data-key="${CSS.escape(last)}"]`)?.focus({ preventScroll: true });
+    const control = last && document.activeElement === document.body && document.querySelector(`[data-key="${CSS.escape(last)}"]`);
+    if (control) restore(control);
   };
   const start = () => { new MutationObserver(tidy).observe(document.body, { childList: true, subtree: true }); tidy(); };
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start); else start();

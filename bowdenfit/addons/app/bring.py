@@ -55,12 +55,17 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
             zone = block("div")
         place = block("div")
 
+    newest = {"look": 0}
+
     async def look_again() -> None:
+        newest["look"] = look = newest["look"] + 1
         if draft.files and not (draft.is_arriving or draft.understanding.files):
             place.clear()
             with place:
                 text("Reading the files ...", role="status")
         understanding = Understanding() if draft.is_arriving else await workbench.compute(draft.understand)
+        if look != newest["look"]:  # something was answered since, and is looked at next
+            return
         place.clear()
         with place:
             if draft.is_arriving:

@@ -5,7 +5,7 @@ from typing import Any
 
 from bowdenfit.addons.app import angle_charts, friction_charts, motion_charts, recording_charts, rope_charts
 from bowdenfit.addons.app.measured_rows import MeasuredRows, UnusedRow
-from bowdenfit.addons.app.points import COLORS, Drawers, Points, make_chart
+from bowdenfit.addons.app.points import COLORS, Drawers, Points, make_chart, parse_sample_key
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.lone_file import FileColumn
 from bowdenfit.pages.section import Chart, Picture, SeriesGroup
@@ -16,15 +16,19 @@ _DRAWERS: Drawers = {
     **friction_charts.DRAWERS, **angle_charts.DRAWERS, **recording_charts.DRAWERS, **rope_charts.DRAWERS,
     **motion_charts.DRAWERS,
 }  # fmt: skip
+_STRETCH_CLICKED = "To leave a stretch out, click on a line where it begins, and then where it ends."
 _MARKS = {"Left out by you": "Gray, left out by you", "Refused": "Red, refused"}
 
 
-def make_pictures(measured: MeasuredRows, curves: Sequence[SeriesGroup] = ()) -> tuple[Picture, ...]:
+def make_pictures(
+    measured: MeasuredRows, curves: Sequence[SeriesGroup] = (), can_change: bool = True
+) -> tuple[Picture, ...]:
     """Return the charts of a data set, one picture for each kind of table.
 
     Args:
         measured: Its rows.
         curves: Curves of wrap angles, see `fit_curves`.
+        can_change: Whether a stretch of a recording can be left out.
     """
     dataset = measured.dataset
     made: list[Picture] = []
@@ -35,20 +39,23 @@ def make_pictures(measured: MeasuredRows, curves: Sequence[SeriesGroup] = ()) ->
         unused = [row for row in measured.unused if row.kind == kind.name]
         more: dict[str, Any] = {"lines": curves} if type(table) in angle_charts.DRAWERS else {}
         charts = draw(table, dataset, unused, **more)
-        made.append(Picture(f"data-{kind.name}", title, "", tuple(charts), _caption(charts, unused), alone=True))
+        made.append(Picture(f"data-{kind.name}", title, "", tuple(charts), _caption(charts, unused, can_change), alone=True))
     return tuple(made)
 
 
-def _caption(charts: Sequence[Chart], unused: Sequence[UnusedRow]) -> str:
-    """Say what a picture shows."""
-    labels = [series.label for chart in charts[:1] for group in chart.groups for series in group.series for _ in group.x]
+def _caption(charts: Sequence[Chart], unused: Sequence[UnusedRow], can_change: bool) -> str:
+    """Say what a picture shows, and what a click does."""
+    shown = (series for chart in charts for group in chart.groups for series in group.series if series.label in _MARKS)
+    labels = [label for label, _ in {(series.label, key) for series in shown for key in series.keys}]
     sentences = ["As measured, before any fit."]
     sentences += [f"{words}: {labels.count(label)}." for label, words in _MARKS.items() if label in labels]
     missing = len(unused) - sum(labels.count(label) for label in _MARKS)
     sentences += [f"{counted(missing, 'row')} without a number to draw: see below."] if missing > 0 and charts else []
     sentences += ["The menu shows the other charts."] if len(charts) > 1 else []
-    has_rows = any(series.keys for chart in charts for group in chart.groups for series in group.series)
-    return " ".join([*sentences, "Click a point to see its row below."] if has_rows else sentences)
+    keys = {key for chart in charts[:1] for group in chart.groups for series in group.series for key in series.keys[:1]}
+    if any(parse_sample_key(key) for key in keys):
+        return " ".join([*sentences, _STRETCH_CLICKED] if can_change else sentences)
+    return " ".join([*sentences, "Click a point to see its row below."] if keys else sentences)
 
 
 def _label(column: FileColumn) -> str:

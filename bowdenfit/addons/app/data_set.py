@@ -5,7 +5,7 @@ from contextlib import suppress
 from nicegui import ui
 
 from bowdenfit.addons.app.add_rows import show_table_links
-from bowdenfit.addons.app.description_edit import exclude_row, include_row
+from bowdenfit.addons.app.description_edit import Part, exclude_part, include_part
 from bowdenfit.addons.app.draft import list_refusals
 from bowdenfit.addons.app.elements import address, block, button, field, link, text, text_input
 from bowdenfit.addons.app.equivalent_command import EquivalentCommand, show_command, write_command
@@ -145,16 +145,16 @@ class DataSetPage:
             elif error is not None:
                 refused(str(error))
             refusals = list_refusals(error) if error else ()
-            await MeasuredView(self._workbench, folder, self._change_row).show(refusals, warnings)
+            await MeasuredView(self._workbench, folder, self._change_part).show(refusals, warnings)
 
-    async def _change_row(self, kind: str, file: str, row: int, reason: str | None) -> None:
-        """Leave a row out with a reason, or take it in again without one; and look at the data set anew.
+    async def _change_part(self, kind: str, file: str, part: Part, reason: str | None) -> None:
+        """Leave a part of a table out with a reason, or take it in again without one; and look at the data set again.
 
         Raises:
             UsageError, DescriptionError, StoreError: cable.toml cannot be changed so.
         """
         if reason is None:
-            await self._workbench.compute(include_row, self._folder, kind, file, row)
+            await self._workbench.compute(include_part, self._folder, kind, file, part)
         else:
-            await self._workbench.compute(exclude_row, self._folder, kind, file, row, reason)
+            await self._workbench.compute(exclude_part, self._folder, kind, file, part, reason)
         await self._look()

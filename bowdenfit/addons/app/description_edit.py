@@ -1,11 +1,11 @@
-"""Changes to a cable.toml that keep its comments and order: readings left out, and taken in again."""
+"""Changes to a cable.toml that keep its comments and order: readings and recordings left out, and taken in again."""
 
 import shutil
 import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
@@ -16,17 +16,24 @@ from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.outputs import refuse_link, replace_atomically
 
+Part: TypeAlias = int | tuple[float, float] | None
+"""What is left out of a file: a row by its number, a stretch of a recording by its start and end [s], or None for all of it."""
 _LONGEST_REASON = 200  # characters; a judgement
 
 
-def exclude_row(folder: Path, kind: str, file: str, row: int, reason: str) -> None:
-    """Leave a row of a table out, and keep the reason.
+def name_part(part: Part) -> str:
+    """Return what a part of a file is called, such as "row 7"."""
+    return "all" if part is None else f"row {part}" if isinstance(part, int) else f"{part[0]:.12g} to {part[1]:.12g} s"
+
+
+def exclude_part(folder: Path, kind: str, file: str, part: Part, reason: str) -> None:
+    """Leave a part of a table out, and keep the reason.
 
     Args:
         folder: The data set.
         kind: Kind of the table.
         file: Its file, as seen from the data set.
-        row: Number of the row in it.
+        part: What of it.
         reason: Why.
 
     Raises:
@@ -37,57 +44,60 @@ def exclude_row(folder: Path, kind: str, file: str, row: int, reason: str) -> No
     words = " ".join(reason.split())
     if not 0 < len(words) <= _LONGEST_REASON:
         raise UsageError(
-            f"write why row {row} is left out, in {_LONGEST_REASON} characters at most, such as: the rope jumped. It stands in "
-            "the report."
+            f"write why {name_part(part)} is left out, in {_LONGEST_REASON} characters at most, such as: the rope jumped. It "
+            "stands in the report."
         )
-    write_description(folder, tomlkit.dumps(_change_table(folder, kind, partial(_add_row, file, row, words))))
+    write_description(folder, tomlkit.dumps(_change_table(folder, kind, partial(_add_part, file, part, words))))
 
 
-def preview_exclusion(folder: Path, kind: str, file: str, row: int, reason: str) -> str:
-    """Return the lines of cable.toml with which a row is left out.
+def preview_exclusion(folder: Path, kind: str, file: str, part: Part, reason: str) -> str:
+    """Return the lines of cable.toml with which a part of a table is left out.
 
     Args:
-        folder, kind, file, row, reason: See `exclude_row`.
+        folder, kind, file, part, reason: See `exclude_part`.
 
     Raises:
         UsageError: There is no such table.
     """
-    document = _change_table(folder, kind, partial(_add_row, file, row, " ".join(reason.split())))
+    document = _change_table(folder, kind, partial(_add_part, file, part, " ".join(reason.split())))
     return tomlkit.dumps({"tables": {kind: {"exclude": document["tables"][kind]["exclude"]}}}).strip()
 
 
-def _add_row(file: str, row: int, reason: str, settings: Any) -> None:
-    """Add a row to those that a table leaves out."""
+def _add_part(file: str, part: Part, reason: str, settings: Any) -> None:
+    """Add a part to those that a table leaves out; a row to those with the same reason."""
     entries = settings.setdefault("exclude", tomlkit.array())
+    keys: dict[str, Any] = {"rows": [part]} if isinstance(part, int) else dict(zip(("start", "end"), part or (), strict=False))
     for entry in entries:
-        if entry["reason"] == reason and entry.get("file", file) == file:
-            entry["rows"] = sorted({*entry["rows"], row})
+        if isinstance(part, int) and entry["reason"] == reason and entry.get("file", file) == file:
+            entry["rows"] = sorted({*entry["rows"], part})
             return
     entry = tomlkit.inline_table()
-    entry.update(({} if settings.get("file") == file else {"file": file}) | {"rows": [row], "reason": reason})
+    entry.update(({} if settings.get("file") == file else {"file": file}) | keys | {"reason": reason})
     entries.append(entry)
 
 
-def include_row(folder: Path, kind: str, file: str, row: int) -> None:
-    """Take a row of a table in again that was left out.
+def include_part(folder: Path, kind: str, file: str, part: Part) -> None:
+    """Take a part of a table in again that was left out.
 
     Args:
-        folder, kind, file, row: See `exclude_row`.
+        folder, kind, file, part: See `exclude_part`.
 
     Raises:
-        UsageError, DescriptionError, StoreError: See `exclude_row`.
+        UsageError, DescriptionError, StoreError: See `exclude_part`.
     """
 
     def change(settings: Any) -> None:
         entries = settings.get("exclude", [])
         for number in reversed(range(len(entries))):
             entry = entries[number]
-            if entry.get("file", file) == file and row in entry["rows"]:
-                rows = [other for other in entry["rows"] if other != row]
-                if rows:
-                    entry["rows"] = rows
-                else:
-                    del entries[number]
+            rows, span = entry.get("rows", []), (entry.get("start"), entry.get("end"))
+            is_meant = part in rows if isinstance(part, int) else not rows and span == (part or (None, None))
+            if entry.get("file", file) != file or not is_meant:
+                continue
+            if other_rows := [row for row in rows if row != part]:
+                entry["rows"] = other_rows
+            else:
+                del entries[number]
         if not len(entries):
             settings.pop("exclude", None)
 

@@ -24,6 +24,8 @@ _TITLES = {
     "recording": "Recording",
     "sensors": "Load cells", "errors": "Errors of the bench that no reading shows", "sampler": "Sampler",
 }  # fmt: skip
+_DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(\d+)")
+_PERCENT = re.compile(r"([+-]?\d+(?:\.\d+)?)\s*%")
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 _EXAMPLES = {
     "columns": '{ input_force = { name = "F1", unit = "N" } }',
@@ -31,6 +33,7 @@ _EXAMPLES = {
     "measured": "{ value = 0.10, sd = 0.02 }",
     "range": "[430, 530]",
 }
+_QUANTITIES = {"delay": "10 ms", "clock_shift": "10 ms", "block": "50 ms", "length": "500 mm"}
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class FormField:
         kind: How it is typed.
         value: As it is typed; empty where the description leaves it out.
         hint: What it does, how it is written, and what holds where it is left out.
-        options: Of a menu.
+        options: Of a menu, or the words that do in place of a quantity.
         needed: Whether it may not be left out.
     """
 
@@ -128,8 +131,9 @@ def _list_fields(target: Schema, values: Mapping[str, Any], path: Path, above: s
             yield from _list_fields(part, value if isinstance(value, Mapping) else {}, here, f"{above}{key}.")
             continue
         kind, options = _kind_of(schema)
+        hint = _hint(key, schema, kind, options)
         yield FormField(
-            here, f"{above}{key}", kind, "" if value is None else show_value(value), _hint(key, schema, kind), options,
+            here, f"{above}{key}", kind, "" if value is None else show_value(value), hint, options,
             key in target.get("required", ()),
         )  # fmt: skip
 
@@ -139,6 +143,9 @@ def _kind_of(schema: Schema) -> tuple[str, tuple[str, ...]]:
     if "enum" in schema:
         return MENU, tuple(str(option) for option in schema["enum"] if option is not None)
     parts = [_resolve(part) for part in schema.get("anyOf", [schema]) if part.get("type") != "null"]
+    words = [option for part in parts for option in part.get("enum", [part["const"]] if "const" in part else [])]
+    if words and any("value" in part.get("properties", {}) for part in parts):
+        return QUANTITY, tuple(words)
     if len(parts) != 1:
         return TOML, ()
     (part,) = parts
@@ -150,10 +157,12 @@ def _kind_of(schema: Schema) -> tuple[str, tuple[str, ...]]:
     return kinds.get(part.get("type", ""), TOML), ()
 
 
-def _hint(key: str, schema: Schema, kind: str) -> str:
+def _hint(key: str, schema: Schema, kind: str, options: Sequence[str]) -> str:
     """Return what a key does, how it is written, and what holds where it is left out."""
     words = [_LINK.sub(r"\1", schema.get("description", ""))]
-    words += ["A number with its unit, such as 0.5 N or 45 deg."] if kind == QUANTITY else []
+    if kind == QUANTITY:
+        others = f"As {', '.join(options)}, or as a" if options else "A"
+        words.append(f"{others} number with its unit, such as {_QUANTITIES.get(key, '0.5 N or 45 deg')}.")
     words += [f"As in TOML{_example(key)}."] if kind == TOML else []
     default = schema.get("default")
     if default not in (None, "", [], {}) and not isinstance(default, Mapping):
@@ -269,8 +278,12 @@ def _read_value(field: FormField, typed: str) -> Any:
     """Return what is typed into a field as a value of TOML; None for an empty one."""
     if not typed:
         return None
-    if field.kind in (TEXT, MENU):
+    if field.kind in (TEXT, MENU) or (field.kind == QUANTITY and typed in field.options):
         return typed
+    if field.kind in (NUMBER, QUANTITY):
+        typed = _DECIMAL_COMMA.sub(r"\1.\2", typed)
+    if field.kind == NUMBER and (share := _PERCENT.fullmatch(typed)):
+        typed = f"{float(share[1]) / 100:.12g}"
     if field.kind == QUANTITY and not typed.startswith("{"):
         number, unit = read_quantity(typed, field.label, "0.5 N")
         return tomlkit.inline_table().append("value", int(number) if number.is_integer() else number).append("unit", unit)

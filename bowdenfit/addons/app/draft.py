@@ -1,5 +1,6 @@
 """A data set that is being brought: its files, what they say, what is asked, and what `check` says of all that."""
 
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -26,6 +27,7 @@ from bowdenfit.words import printable, shown
 if TYPE_CHECKING:
     from bowdenfit.questions.check.data_set_words import Report
 
+_LONGEST_NAME = 60  # characters of a folder that is proposed; a judgement
 _LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
 _FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
@@ -110,8 +112,9 @@ class Draft:
     @property
     def proposed_name(self) -> str:
         """What its folder may be called: after its cable, or after its first file."""
-        name = self.cable if self.is_described else Path(self.files[0].name).stem
-        name = "-".join(name.split()) or "my-cable"
+        checked = self.understanding.checked
+        name = checked.description.name if checked else self.cable if self.is_described else Path(self.files[0].name).stem
+        name = re.sub(r"[^\w.()+-]+", "-", name).strip("-._")[:_LONGEST_NAME] or "my-cable"
         return f"{name}-cable" if is_module_name(name) else name
 
     def new_file(self, name: str) -> Path:

@@ -12,6 +12,7 @@ from bowdenfit.addons.app.points import (
     Drawers,
     Points,
     by_stroke,
+    forces_of,
     make_chart,
     row_keys,
     row_place,
@@ -30,17 +31,14 @@ def _draw_forces(table: ForceTable, dataset: Dataset, unused: Sequence[UnusedRow
     label, places = row_places(table, description)
     ratio = 100 * np.where(table.stroke < 0, table.input_force / table.output_force, table.output_force / table.input_force)
 
-    def forces(row: UnusedRow) -> tuple[float, float]:
-        return row.values.get("input_force", np.nan), row.values.get("output_force", np.nan)
-
     def efficiency(row: UnusedRow) -> tuple[float, float]:
-        low, high = sorted(forces(row))
+        low, high = sorted(forces_of(row))
         return row_place(row, description), 100 * low / high if high else np.nan
 
     shown = by_stroke(table.input_force, table.output_force, table.stroke, table.origin)
     ratios = by_stroke(places, ratio, table.stroke, table.origin)
     charts = [
-        make_chart("Output against input force", INPUT, OUTPUT, [*shown, *unused_points(unused, forces)]),
+        make_chart("Output against input force", INPUT, OUTPUT, [*shown, *unused_points(unused, forces_of)]),
         make_chart(f"Ratio of the forces against {label.split(' (')[0].lower()}", label, "Force transmitted (%)",
                [*ratios, *unused_points(unused, efficiency)]),
     ]  # fmt: skip

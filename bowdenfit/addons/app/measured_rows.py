@@ -12,7 +12,9 @@ from bowdenfit.description.measurements import ExcludedRows
 from bowdenfit.errors import BowdenfitError, Faults
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.descriptions import load_description
+from bowdenfit.kinds.recordings.reader import RecordingsTable
 from bowdenfit.kinds.table_files import Source
+from bowdenfit.recordings.recording import Recordings
 
 READ, LEFT_OUT, REFUSED = "read", "left out", "refused"
 
@@ -71,6 +73,19 @@ class UnusedRow:
 
 
 @dataclass(frozen=True)
+class RecordedFile:
+    """A file of a recording.
+
+    Args:
+        file: Its name, as seen from the data set.
+        excluded: Stretches that the user leaves out [s], None for all of it, each with the reason.
+    """
+
+    file: str
+    excluded: tuple[tuple[tuple[float, float] | None, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class MeasuredRows:
     """What there is to draw of a data set.
 
@@ -78,11 +93,21 @@ class MeasuredRows:
         dataset: What is read, without the rows that are refused; None where the rest is refused too.
         files: The rows of its tables.
         unused: What can be drawn of the others.
+        recorded: The files of its recordings.
     """
 
     dataset: Dataset | None = None
     files: tuple[FileRows, ...] = ()
     unused: tuple[UnusedRow, ...] = ()
+    recorded: tuple[RecordedFile, ...] = ()
+
+    def find_recorded(self, number: int) -> RecordedFile | None:
+        """Return the file of a recording by its number among those that are read; None where it cannot be told."""
+        recordings = self.dataset.measurements.table(Recordings) if self.dataset is not None else None
+        if recordings is None or number >= len(recordings.items):
+            return None
+        named = [file for file in self.recorded if Path(file.file).name == Path(recordings.items[number].file).name]
+        return named[0] if len(named) == 1 else None
 
 
 def collect_rows(folder: Path, refusals: Sequence[Refusal] = ()) -> MeasuredRows:
@@ -106,10 +131,29 @@ def collect_rows(folder: Path, refusals: Sequence[Refusal] = ()) -> MeasuredRows
     for source in sources:
         with suppress(BowdenfitError):
             files += [_list_file_rows(source, path, refusals) for path in source.files]
+    recorded = tuple(_list_recorded(description, folder))
     with suppress(BowdenfitError):
         dataset = read_dataset(_without_refused(description, sources, refusals), folder, {})
-        return MeasuredRows(dataset, tuple(files), tuple(_list_unused(dataset, files)))
-    return MeasuredRows(None, tuple(files))
+        return MeasuredRows(dataset, tuple(files), tuple(_list_unused(dataset, files)), recorded)
+    return MeasuredRows(None, tuple(files), recorded=recorded)
+
+
+def _list_recorded(description: Description, folder: Path) -> list[RecordedFile]:
+    """Return the files of the recordings, with what is left out of each."""
+    settings = description.table(RecordingsTable)
+    if settings is None:
+        return []
+    source = Source("recordings", settings, description, folder)
+    names = [entry.file for entry in description.recording]
+    seconds = {entry.output_file for entry in description.recording}
+    with suppress(BowdenfitError):
+        names += [source.name_of(path) for path in source.files]
+    parts = settings.exclude
+    return [
+        RecordedFile(name, tuple((part.span, part.reason) for part in parts if part.file in (None, name)))
+        for name in dict.fromkeys(names)
+        if name not in seconds
+    ]
 
 
 def _list_file_rows(source: Source, path: Path, refusals: Sequence[Refusal]) -> FileRows:

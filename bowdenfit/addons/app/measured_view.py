@@ -1,6 +1,6 @@
 """What was measured, on pages of drafts and data sets: what `check` says, charts before any fit, and the rows of the files."""
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,8 @@ from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import attempt
 from bowdenfit.addons.app.measured_rows import LEFT_OUT, READ, FileRow, FileRows, MeasuredRows, collect_rows
 from bowdenfit.addons.app.page_words import page_words
-from bowdenfit.addons.app.points import row_key
+from bowdenfit.addons.app.points import parse_sample_key, row_key
+from bowdenfit.addons.app.recorded_parts import KIND, ChangePart, RecordedParts
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.kinds import iterate_tables
@@ -29,7 +30,6 @@ from bowdenfit.words import counted, printable
 if TYPE_CHECKING:
     from bowdenfit.questions.check.data_set_words import Report
 
-ChangeRow: TypeAlias = Callable[[str, str, int, str | None], Awaitable[None]]
 Warnings: TypeAlias = Mapping[str, Sequence[str]]
 _BY_USER = "left out by the user"  # in notes that stay in sight
 _MOST_ROWS = 400  # of a file, that a page shows; a judgement
@@ -46,13 +46,14 @@ class MeasuredView:
     Args:
         workbench: Which works out what takes a while.
         folder: The data set.
-        change_row: Leaves a row out (kind, file, row, reason), or takes it in again where the reason is None; None where rows
-            cannot be changed.
+        change: Leaves a part out (kind, file, part, reason), or takes it in again where the reason is None; None where
+            nothing can be changed.
     """
 
-    def __init__(self, workbench: Workbench, folder: Path, change_row: ChangeRow | None = None) -> None:
-        self._workbench, self._folder, self._change_row = workbench, folder, change_row
+    def __init__(self, workbench: Workbench, folder: Path, change: ChangePart | None = None) -> None:
+        self._workbench, self._folder, self._change = workbench, folder, change
         self._measured = MeasuredRows()
+        self._parts: RecordedParts | None = None
 
     async def show(self, refusals: tuple[Refusal, ...] = (), warnings: Warnings = MappingProxyType({})) -> None:
         """Show charts and rows here; the curves of wrap angles follow once they are worked out.
@@ -64,13 +65,16 @@ class MeasuredView:
         charts, self._rows = block("div", id="charts"), block("div", id="rows")
         self._measured = await self._workbench.compute(collect_rows, self._folder, refusals)
         with charts:
-            place = markup(_render_charts(self._measured, ()), "div")
+            place = markup(_render_charts(self._measured, (), self._change is not None), "div")
+            place.on("pick", self._pick, js_handler="event => emit(event.detail)")
         with self._rows:
-            files = self._measured.files
-            for kind in dict.fromkeys([*warnings, *(file.kind for file in files)]):
+            files, recorded = self._measured.files, [KIND] if self._measured.recorded else []
+            for kind in dict.fromkeys([*recorded, *warnings, *(file.kind for file in files)]):
                 with block("div", id=f"about-{kind}"):
                     for warning in warnings.get(kind, ()):
                         _show_warning(warning)
+                    if kind in recorded and self._change is not None:
+                        self._parts = RecordedParts(self._folder, self._measured.recorded, self._change)
                     for file in (file for file in files if file.kind == kind):
                         self._show_rows(file)
         dataset = self._measured.dataset
@@ -79,7 +83,14 @@ class MeasuredView:
                 curves = await self._workbench.compute(fit_curves, dataset)
             except BowdenfitError:
                 return
-            place.set_content(_render_charts(self._measured, curves))
+            place.set_content(_render_charts(self._measured, curves, self._change is not None))
+
+    def _pick(self, event: Any) -> None:
+        """Take a click on a recording; of any other point the page shows the row itself."""
+        sample = parse_sample_key(str(event.args))
+        file = self._measured.find_recorded(sample[0]) if sample else None
+        if sample and file is not None and self._parts is not None:
+            self._parts.pick(file.file, sample[1])
 
     def _show_rows(self, file: FileRows) -> None:
         """Show the rows of a file, those that are not used marked."""
@@ -88,7 +99,7 @@ class MeasuredView:
         with block("details") as part:
             text(f"{file.file}: {count}", "summary")
             reasons = block("div", aria_live="polite")
-            table = markup(_render_rows(file, self._change_row is not None), "div")
+            table = markup(_render_rows(file, self._change is not None), "div")
             if len(file.rows) > _MOST_ROWS:
                 text(f"The first {_MOST_ROWS} rows, and those that are not used.", classes="hint")
         if unused:
@@ -97,12 +108,12 @@ class MeasuredView:
         async def ask(event: Any) -> None:
             await self._ask_reason(file, int(event.args[1]), reasons)
 
-        if self._change_row is not None:
+        if self._change is not None:
             table.on("click", ask, js_handler=_ROW_CLICKED)
 
     async def _ask_reason(self, file: FileRows, number: int, place: Any) -> None:
         """Ask why a row is left out; one that is left out is taken in again."""
-        change = self._change_row
+        change = self._change
         row = next((row for row in file.rows if row.row == number), None)
         if change is None or row is None:
             return
@@ -188,9 +199,9 @@ def show_checked(report: "Report", warnings: Warnings) -> None:
         report_text(str(report))
 
 
-def _render_charts(measured: MeasuredRows, curves: Any) -> str:
+def _render_charts(measured: MeasuredRows, curves: Any, can_change: bool) -> str:
     """Return the charts as HTML."""
-    return render_section(prose_section("", (), pictures=make_pictures(measured, curves)), {})
+    return render_section(prose_section("", (), pictures=make_pictures(measured, curves, can_change)), {})
 
 
 def _render_rows(file: FileRows, can_change: bool) -> str:

@@ -38,15 +38,25 @@ def _place_of_displacement(row: UnusedRow) -> tuple[float, float]:
 
 def _draw_ring_down(table: RingDownTable, dataset: Dataset, unused: Sequence[UnusedRow]) -> list[Chart]:
     """Return what swings over time, a chart for each run."""
-    del dataset, unused  # whose times are not those from the start of their run
+    del dataset
     keys, charts = np.array(row_keys(table.origin)), []
     label, reading = ("Torque (N m)", table.reading) if table.is_torque else ("Angle (deg)", np.rad2deg(table.reading))
     for number in range(min(len(table.added), _MOST_CHARTS)):
         rows = table.run == number
         points = Points("Reading", "blue", "points", table.time[rows], reading[rows], tuple(keys[rows].tolist()))
         name = f"Run {number + 1}" + (f", {table.added[number]:.4g} kg m² added" if table.added[number] else "")
-        charts.append(make_chart(name, "Time from the release (s)", label, [points]))
+        of_run = [row for row in unused if row.values.get("run") == number]
+        left_out = unused_points(of_run, _place_of_torque if table.is_torque else _place_of_angle)
+        charts.append(make_chart(name, "Time from the release (s)", label, [points, *left_out]))
     return charts
+
+
+def _place_of_torque(row: UnusedRow) -> tuple[float, float]:
+    return row.values.get("time", np.nan), row.values.get("torque", np.nan)
+
+
+def _place_of_angle(row: UnusedRow) -> tuple[float, float]:
+    return row.values.get("time", np.nan), float(np.rad2deg(row.values.get("angle", np.nan)))
 
 
 DRAWERS: Drawers = {

@@ -1,6 +1,7 @@
 """Readings as points of charts, each called as its row, for every kind of table."""
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -18,6 +19,7 @@ _UNUSED = ((LEFT_OUT, "Left out by you", "gray"), (REFUSED, "Refused", "bad"))
 Drawers: TypeAlias = dict[type, tuple[str, Callable[..., list[Chart]]]]
 """Title and function that draws a table, by the class of the table."""
 COLORS = ("blue", "vermillion", "green", "purple", "orange", "sky")
+_SAMPLE = "sample "  # begins what a sample of a recording is called
 MOST_POINTS = 3000  # of a chart; a judgement
 
 
@@ -43,6 +45,19 @@ class Points:
 def row_key(file: str, row: int) -> str:
     """What a point and its row in a table of rows are both called."""
     return f"{row} {file}"
+
+
+def sample_key(recording: int, time: float) -> str:
+    """What a sample of a recording is called: number of the recording, and time on its clock [s]."""
+    return f"{_SAMPLE}{recording} {time:.3f}"
+
+
+def parse_sample_key(key: str) -> tuple[int, float] | None:
+    """Return the number of the recording and the time [s] of a sample by what it is called; None of anything else."""
+    with suppress(ValueError):
+        number, time = key.removeprefix(_SAMPLE).split(" ")
+        return (int(number), float(time)) if key.startswith(_SAMPLE) else None
+    return None
 
 
 def make_chart(
@@ -96,6 +111,11 @@ def unused_points(unused: Sequence[UnusedRow], place: Callable[[UnusedRow], tupl
             x, y = np.array([place(row) for row in rows], dtype=float).T
             made.append(Points(label, color, "hollow", x, y, tuple(row_key(row.file, row.row) for row in rows)))
     return made
+
+
+def forces_of(row: UnusedRow) -> tuple[float, float]:
+    """Return input and output force of a row that is not used."""
+    return row.values.get("input_force", np.nan), row.values.get("output_force", np.nan)
 
 
 def row_places(table: ForceRows, description: Description) -> tuple[str, Vector]:

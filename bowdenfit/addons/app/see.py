@@ -178,6 +178,10 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
                 answer = _show_text(printed)
                 loading = text("Loading the fit, for what can be asked of it ...", classes="hint", role="status")
                 command = show_command(SUMMARY_VERB, {"results": folder}, workbench.folder, printed.text, key="summary-command")
+                if past.data_set:  # whose description the verdict may ask to change
+                    with block("div", "row"):
+                        link("Look at its data", address("data", past.data_set), "button")
+                        link("Describe the cable", address("describe", past.data_set), "button")
             with block("div") as right:
                 pass
         below = block("div", id="everything")

@@ -229,7 +229,7 @@ class Workbench:
         changed = (folder / FIT_FILE).stat().st_mtime_ns
         known = self._open.get(name)
         if known is None or known[0] != changed:
-            known = (changed, await self.compute(bf.load, folder))
+            known = (changed, await self.compute(bf.Fit.load, folder))
             self._open = dict([*((key, kept) for key, kept in self._open.items() if key != name), (name, known)][-_MOST_OPEN:])
         return known[1]
 

@@ -56,12 +56,14 @@ class RecordingsTable(TableSettings):
     exclude: Annotated[tuple[ExcludedSpan, ...], Field(max_length=_MOST_SPANS)] = ()
 
     def list_excluded(self) -> list[tuple[tuple[str, str], int, str]]:
-        """Return the stretches that are left out, such as "470mm.csv, 3 to 4.5 s (the rope jumped)"."""
-        file, words = self.files if isinstance(self.files, str) else "the recording", ("stretch", "stretches")
-        return [
-            (words, 1, f"{part.file or file}, {part.start:g} to {part.end:g} s ({part.reason})")
-            for part in self.exclude
-        ]
+        """Return the stretches that are left out, such as "470mm.csv, 3 to 4.5 s (the rope jumped)", and whole recordings."""
+        excluded = []
+        for part in self.exclude:
+            file = part.file or (self.files if isinstance(self.files, str) else "the recording")
+            place = f", {part.start:g} to {part.end:g} s" if part.span else ""
+            words = ("stretch", "stretches") if part.span else ("recording", "recordings")
+            excluded.append((words, 1, f"{file}{place} ({part.reason})"))
+        return excluded
 
     @property
     def fits_offsets(self) -> bool:
@@ -86,10 +88,11 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
         DatasetError, DescriptionError: The fault, in a sentence.
     """
     description = source.description
-    entries = _list_entries(source)
+    files_of_all = [*(source.folder / entry.file for entry in description.recording), *source.files]
+    unused = _find_unused(source, files_of_all)
+    entries = _list_entries(source, unused)
     _check_names(entries)
     faults = Faults()
-    files_of_all = [path for path, _ in entries]
     read = faults.read_all(lambda entry: _read_file(source, *entry, files_of_all), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
@@ -112,7 +115,23 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     accounts = dict.fromkeys(account for f in files for account in f.accounts)  # a file may hold several recordings
     paths = {entry.file: path for path, entry in entries}
     paths |= {entry.output_file: source.folder / entry.output_file for _, entry in entries if entry.output_file}
+    paths |= {source.name_of(path): path for path in unused if path.exists()}
     return TableFromFiles(recordings, paths, tuple(remarks), tuple(accounts))
+
+
+def _find_unused(source: Source, files: Sequence[Path]) -> list[Path]:
+    """Return the files of which the user leaves out all.
+
+    Raises:
+        DatasetError: They are all files.
+        DescriptionError: See `Source.find_excluded`.
+    """
+    unused = [path for path in files if any(part.span is None for part in source.find_excluded(path, files))]
+    if unused and len(unused) == len(files):
+        raise DatasetError(
+            "exclude leaves out every recording; leave one in, or delete the recordings under [tables] in cable.toml."
+        )
+    return unused
 
 
 @dataclass(frozen=True)
@@ -197,8 +216,8 @@ def _pool_delays(delays: Vector, sds: Vector) -> tuple[float, float]:
     return mean, float(np.hypot(np.sqrt(max(chance, apart)), COMMON_ERROR))
 
 
-def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
-    """List every file with its entry; a file named in a [[recording]] is not read twice."""
+def _list_entries(source: Source, unused: Sequence[Path]) -> list[tuple[Path, RecordingFile]]:
+    """List every file that is used with its entry; a file named in a [[recording]] is not read twice."""
     description = source.description
     entries = [(source.folder / entry.file, entry) for entry in description.recording]
     joined = [source.folder / entry.output_file for _, entry in entries if entry.output_file]
@@ -208,9 +227,10 @@ def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     named = {path.resolve() for path in stated}
     for path in source.files:
         refuse_special(path)
-        if path.resolve() not in named:
+        if path.resolve() not in named and path not in unused:
             entry = parse_file_name(description, source.settings.pattern, path, source.name_of(path))
             entries.append((path, entry.model_copy(update={"sheet": source.settings.sheet})))
+    entries = [(path, entry) for path, entry in entries if path not in unused]
     labels, files = [entry.run or "" for _, entry in entries], [path.name for path, _ in entries]
     runs_of_files = zip(entries, unify_labels(labels, files, "runs of recordings"), strict=True)
     entries = [(path, entry.model_copy(update={"run": run or None})) for (path, entry), run in runs_of_files]
@@ -273,7 +293,7 @@ def _read_file(source: Source, path: Path, entry: RecordingFile, files_of_all: S
     shift = None
     if output_rows:
         raw, shift, page = align_clocks(raw, entry.clock_shift, page)
-    raw = leave_out_spans(raw, [(part.start, part.end) for part in source.find_excluded(path, files_of_all)])
+    raw = leave_out_spans(raw, [part.span for part in source.find_excluded(path, files_of_all)])
     stated = [value for value in (entry.clock_shift, page.delay) if isinstance(value, QuantityValue)]
     stated_sd = max((value.sd_to("time") or 0.0 for value in stated), default=0.0)
     if entry.velocity is not None and not unit:

@@ -1,7 +1,7 @@
 """Ring-down: the released joint swings against the rope, the motor held; how it is read, checked and described."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from bowdenfit.description.file import Stated
 from bowdenfit.description.values import QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, require_column
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.rows import FileRows, RowOrigin, number_names, origin_of_rows, read_labels
@@ -101,15 +102,15 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
     added = np.asarray(columns["added_inertia"].numbers()) if "added_inertia" in columns else np.zeros(len(time))
     table.faults.refuse()
     releases = [_find_release(clock, table.file, name, run == i, time, added) for i, name in enumerate(names)]
-    since = time - np.array([start for start, _ in releases])[run]
+    starts = np.array([start for start, _ in releases])
     stated, inertia, sd = source.settings.inertia, np.nan, np.nan
     if stated is not None:
         inertia, sd = stated.to("inertia"), stated.sd_to("inertia") or np.nan
     more = np.array([more for _, more in releases])
-    made = RingDownTable(since, reading, is_torque, run, more, inertia, sd, origin_of_rows(table))
+    made = RingDownTable(time - starts[run], reading, is_torque, run, more, inertia, sd, origin_of_rows(table))
     for i, name in enumerate(names):
         _check_swings(table, name, made, i)
-    return TableFromFiles(made, {path.name: path}, accounts=(table.account,))
+    return TableFromFiles(made, {path.name: path}, accounts=(_count_from_releases(table.account, made, starts),))
 
 
 def _read_runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
@@ -135,6 +136,29 @@ def _find_release(clock: Column, file: str, name: str, in_run: np.ndarray, time:
         words = f"the added inertia {added[rows[0]]:g} kg m^2 is negative; write what was added to the joint"
         raise DatasetError(f"{called}: {words}.")
     return float(time[rows[0]]), float(added[rows[0]])
+
+
+def _count_from_releases(account: RowAccount, table: RingDownTable, starts: Vector) -> RowAccount:
+    """Return the account with the run of each reading that the user leaves out, its time since the release, and torque in N m.
+
+    It is of the run of the row above; of that of the row below where time goes back to it, as at the start of a run.
+
+    Args:
+        account: Of the file.
+        table: Its other readings.
+        starts: When each run was released [s].
+    """
+    excluded, last = [], len(table.time) - 1
+    for reading in account.excluded:
+        values, below = dict(reading.values), int(np.searchsorted(table.origin.row, reading.row))
+        run = table.run[max(below - 1, 0)]
+        if "time" in values and values["time"] < starts[run] + table.time[max(below - 1, 0)]:
+            run = table.run[min(below, last)]
+        for name, start, unit in (("time", starts[run], 1.0), ("torque", 0.0, 1000.0)):
+            if name in values:
+                values[name] = float(values[name] - start) / unit
+        excluded.append(replace(reading, values=values | {"run": float(run)}))
+    return replace(account, excluded=tuple(excluded))
 
 
 def _check_swings(table: RawTable, name: str, made: RingDownTable, run: int) -> None:

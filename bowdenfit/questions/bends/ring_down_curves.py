@@ -33,7 +33,9 @@ def collect_ring_downs(fit: Record) -> tuple[RingDown, ...] | None:
     for run in runs:
         curve = scale * quantiles_of_draws(draws["along"][:, along.run == run])
         points = times[run], scale * table.reading[table.run == run], scale * fitted[table.run == run]
-        ring_downs.append(RingDown(_name_run(table, run), quantity, unit, fine[run], curve, *points))
+        excluded = fit.dataset.measurements.excluded_points("ringdown", "time", quantity.lower(), run)
+        left_out = excluded * [[1.0], [scale]]
+        ring_downs.append(RingDown(_name_run(table, run), quantity, unit, fine[run], curve, *points, left_out))
     return tuple(ring_downs)
 
 

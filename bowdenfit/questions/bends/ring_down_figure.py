@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_left_out, describe_strip
 from bowdenfit.plots.curves import choose_evenly, draw_quantiles, name_band, note_shown_count
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import enlarge_marks, span
+from bowdenfit.plots.panels import draw_left_out, enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLUE, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
 from bowdenfit.questions import bends as room
@@ -36,6 +36,7 @@ class RingDown:
         reading: Quantiles there.
         points_time, points: Readings.
         points_fitted: Median of the fitted reading where each was made.
+        left_out: Time and reading of those that the user leaves out [s].
     """
 
     label: str
@@ -46,6 +47,7 @@ class RingDown:
     points_time: np.ndarray
     points: np.ndarray
     points_fitted: np.ndarray
+    left_out: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 def data(fit: Record) -> tuple[RingDown, ...] | None:
@@ -59,8 +61,9 @@ def caption(runs: tuple[RingDown, ...]) -> str:
     return (
         f"{first.quantity} against the time since the release of the joint, {count_shown(shown, len(runs), 'run')}: what was "
         f"read, and the fitted free vibration. {describe_curve(len(first.reading) > 1)} {describe_strip(f'in {first.unit}')} "
-        f"n = {counted(sum(len(run.points) for run in runs), 'reading')} in {counted(len(runs), 'run')}."
-    )
+        f"n = {counted(sum(len(run.points) for run in runs), 'reading')} in {counted(len(runs), 'run')}. "
+        f"{describe_left_out(np.concatenate([run.left_out for run in runs], axis=1))}"
+    ).rstrip()
 
 
 @in_paper_style
@@ -76,6 +79,7 @@ def draw(runs: tuple[RingDown, ...], width: float | None = None) -> Figure:
         name_band(axes, run.reading)
         _draw_readings(axes, run.points_time, run.points)
         _draw_readings(strip, run.points_time, run.points - run.points_fitted)
+        draw_left_out(axes, run.left_out)
     made.finish_strips()
     made.label("Time (s)", f"{shown[0].quantity} ({shown[0].unit})", shown[0].unit)
     note_shown_count(made.mains[-1], len(shown), len(runs), "runs")

@@ -7,7 +7,7 @@ import pytest
 
 from bowdenfit.addons.app.describe import find_faults
 from bowdenfit.addons.app.description_form import MENU, add_part, list_groups, set_field, show_value
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.kinds.descriptions import CableDescription, parse_description
 
 DATASETS = Path(__file__).parents[3] / "datasets"
@@ -45,6 +45,8 @@ def test_typing_what_stands_there_changes_nothing(name):
         (("noise",), "student", "student"),
         (("sampler", "max_steps"), "40000", 40000),
         (("reference_force",), "50 N", {"value": 50, "unit": "N"}),
+        (("reference_force",), "50,5 N", {"value": 50.5, "unit": "N"}),
+        (("sensors", "input_ratio"), "0,5 %", 0.005),
     ],
 )
 def test_a_field_is_written_where_a_hand_would_write_it(path, typed, expected):
@@ -58,6 +60,18 @@ def test_a_field_is_written_where_a_hand_would_write_it(path, typed, expected):
     cleared = set_field(text, fields_of(text)[path], "")
     original = fields_of(BENCH)[path].value
     assert fields_of(cleared)[path].value == ("" if not original or path[0] in ("contact", "route") else original)
+
+
+@pytest.mark.parametrize(("typed", "expected"), [("10 ms", {"value": 10, "unit": "ms"}), ("none", "none")])
+def test_a_key_of_words_or_a_quantity_takes_both_and_says_so(typed, expected):
+    text = (DATASETS / "synthetic-recordings" / "cable.toml").read_text()
+    field = fields_of(text)["tables", "recordings", "prepare", "delay"]
+    assert "As estimated, none, or as a number with its unit, such as 10 ms." in field.hint
+    changed = set_field(text, field, typed)
+    assert tomllib.loads(changed)["tables"]["recordings"]["prepare"]["delay"] == expected
+    assert fields_of(changed)[field.path].value == typed and find_faults(changed) == []
+    with pytest.raises(BowdenfitError, match=r"prepare\.delay: input should be .* or a number with its unit"):
+        parse_description({**tomllib.loads(text), "tables": {"recordings": {"prepare": {"delay": "late"}}}})
 
 
 def test_curves_are_a_menu():

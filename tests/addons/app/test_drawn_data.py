@@ -3,8 +3,10 @@
 import pytest
 from app_in_browser import faults_of, served, visiting
 from half_turn_bench import describe_half_turn
+from recorded_benches import RecordedBench, write
 
 import bowdenfit as bf
+from bowdenfit.recordings.recording import Recordings
 
 ROWS = "input_force_N,output_force_N,run\n20,15.2,1\n40,30.1,1\n60,45.6,1\n20,15.0,2\n40,30.9,2\n60,46.0,2\n"
 pytestmark = pytest.mark.extended
@@ -53,6 +55,53 @@ def test_a_point_shows_its_row_which_is_left_out_and_taken_in_again(chromium, tm
         assert (folder / "cable.toml").read_text() == describe_half_turn()
 
 
+def click_on_line(page, figure, x):
+    """Click down a chart at a place of its axis, twice in each row of pixels that a line may cross, until the form follows."""
+    box = page.locator(f"{figure} .u-over").first.bounding_box()
+    low, high = map(float, page.locator(f"{figure} .chart").first.get_attribute("data-shown").split())
+    unchanged = page.locator("#leave-out").inner_html()
+    for y in range(4, int(box["height"]), 12):
+        page.mouse.click(box["x"] + box["width"] * (x - low) / (high - low), box["y"] + y)
+        page.wait_for_timeout(60)
+        if page.locator("#leave-out").inner_html() != unchanged:
+            return
+    raise AssertionError(f"no line at {x}")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_a_stretch_of_a_recording_is_left_out_by_two_clicks_and_a_whole_one_by_a_button(chromium, tmp_path, width, scheme):
+    folder = write(RecordedBench(rate=100.0, length=60.0, mountings=2), tmp_path / "bench", seed=4)
+    original = (folder / "cable.toml").read_text()
+    with served(tmp_path) as app, visiting(chromium, app, width=width, color_scheme=scheme) as visit:
+        page, figure = visit.page, "#figure-data-recordings"
+        page.goto(f"{visit.root}/data/bench")
+        page.locator(f"{figure} .uplot").first.wait_for()
+        for time in (20, 26):
+            page.locator(figure).scroll_into_view_if_needed()
+            click_on_line(page, figure, time)
+        start, end = (float(page.locator(f"#part-{key}").input_value()) for key in ("start", "end"))
+        assert abs(start - 20) < 1 and abs(end - 26) < 1 and faults_of(page) == []
+        page.get_by_label("Why?").fill("leaned on <i>it</i>")
+        page.get_by_role("button", name="Leave it out").click()
+        name = f"{start:.12g} to {end:.12g} s"
+        page.get_by_text(f"1 stretch left out by the user: r0.csv, {name} (leaned on <i>it</i>).", exact=True).wait_for()
+        page.get_by_text("Left out by the user", exact=True).first.wait_for()
+        page.get_by_role("button", name="Leave all of it out: r1.csv").click()
+        page.get_by_role("button", name="Leave it out").click()
+        page.get_by_text("write why all is left out").wait_for()
+        page.get_by_label("Why is all of r1.csv left out?").fill("the clamp slipped")
+        page.get_by_role("button", name="Leave it out").click()
+        again = page.get_by_role("button", name="Use it again: all of r1.csv")
+        again.wait_for()
+        assert [item.file for item in bf.read(folder).measurements.table(Recordings).items] == ["r0.csv"]
+        assert faults_of(page) == []
+        again.click()
+        again.wait_for(state="detached")
+        page.get_by_role("button", name=f"Use it again: {name} of r0.csv").click()
+        page.get_by_text("Left out by the user", exact=True).wait_for(state="detached")
+        assert (folder / "cable.toml").read_text() == original
+
+
 def test_files_are_drawn_while_they_are_added_and_refused_rows_are_red(chromium, tmp_path):
     with served(tmp_path) as app, visiting(chromium, app) as visit:
         page = visit.page
@@ -67,3 +116,29 @@ def test_files_are_drawn_while_they_are_added_and_refused_rows_are_red(chromium,
         refused.wait_for()
         assert refused.get_attribute("data-row-key") == "7 b.csv" and "'slip' is not a number" in refused.inner_text()
         assert faults_of(page) == []
+
+
+DRAW_BOX = """() => {
+  document.querySelector("[data-key=probe]")?.remove();
+  const box = Object.assign(document.createElement("input"), { type: "text" });
+  box.dataset.key = "probe";
+  box.addEventListener("change", event => { globalThis.told = event.target.value; });
+  globalThis.told = null;
+  document.querySelector("main").append(box);
+}"""
+
+
+def test_what_is_being_typed_stays_when_a_part_is_drawn_again_and_is_told_when_it_is_left(chromium, tmp_path):
+    with served(tmp_path) as app, visiting(chromium, app) as visit:
+        page, box = visit.page, visit.page.locator("[data-key=probe]")
+        page.evaluate(DRAW_BOX)
+        box.press_sequentially("180")
+        page.evaluate(DRAW_BOX)
+        page.wait_for_function("document.activeElement.value === '180'")
+        assert page.evaluate("globalThis.told") is None
+        page.keyboard.press("Tab")
+        page.wait_for_function("globalThis.told === '180'")
+        box.focus()
+        page.evaluate(DRAW_BOX)
+        page.wait_for_function("document.activeElement.dataset.key === 'probe'")
+        assert box.input_value() == "", "what was told is not kept"

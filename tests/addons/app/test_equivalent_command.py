@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bowdenfit.addons.app.description_edit import exclude_row, preview_exclusion
+from bowdenfit.addons.app.description_edit import exclude_part, preview_exclusion
 from bowdenfit.addons.app.equivalent_command import write_command
 from bowdenfit.addons.app.fit_job import FitRequest
 from bowdenfit.questions.compare.verb import VERB as COMPARE
@@ -41,9 +41,9 @@ def test_the_lines_that_leave_a_row_out_are_those_that_are_saved(tmp_path):
 
     (tmp_path / "cable.toml").write_text(describe_half_turn(name="bench"))
     (tmp_path / "forces.csv").write_text("input_force_N,output_force_N,run\n20,15,1\n40,30,2\n60,45,3\n")
-    exclude_row(tmp_path, "forces", "forces.csv", 2, "it  slipped")
+    exclude_part(tmp_path, "forces", "forces.csv", 2, "it  slipped")
     lines = preview_exclusion(tmp_path, "forces", "forces.csv", 3, 'the "rope" jumped')
-    exclude_row(tmp_path, "forces", "forces.csv", 3, 'the "rope" jumped')
+    exclude_part(tmp_path, "forces", "forces.csv", 3, 'the "rope" jumped')
     assert lines.splitlines()[0] == "[tables.forces]"
     assert lines.splitlines()[1] in (tmp_path / "cable.toml").read_text()
     assert "it slipped" in lines

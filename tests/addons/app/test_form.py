@@ -59,6 +59,14 @@ def test_an_answer_that_cannot_be_read_is_refused_in_the_words_of_the_terminal()
     assert form.entries[0].fault == "'some' is not a number; write one, such as 3."
 
 
+def test_the_folder_is_called_after_the_cable(draft_of):
+    draft = draft_of(forces=TABLE)
+    draft.understand()
+    answer(draft, "By which angle", "180 deg")
+    answer(draft, "What is the cable called?", "Knie: Prüfstand 2/3")
+    assert draft.proposed_name == "Knie-Prüfstand-2-3"
+
+
 def test_a_draft_is_understood_as_init_understands_it(draft_of, tmp_path):
     draft = draft_of(forces=TABLE)
     initial = draft.understand()

@@ -80,6 +80,8 @@ def test_a_fit_says_that_its_data_have_changed_and_is_started_from_values(chromi
             page.goto(f"{visit.root}/{place}")
             page.get_by_text("Changed since this fit: 'efficiencies.csv'.").first.wait_for()
             findings += [*serious_findings(page, axe), *faults_of(page)]
+        page.get_by_role("link", name="Describe the cable").click()
+        page.get_by_text("Nothing is wrong with this description").wait_for()
         page.goto(f"{visit.root}/try/on-body?fit=on-body")
         page.locator("#misfit span").wait_for()
         page.get_by_label("mu1", exact=True).press("ArrowRight")

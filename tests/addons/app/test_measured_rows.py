@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from half_turn_bench import describe_half_turn
+from recorded_benches import RecordedBench, write
 
 import bowdenfit as bf
 from bowdenfit.addons.app.angle_charts import fit_curves
 from bowdenfit.addons.app.data_charts import make_pictures
-from bowdenfit.addons.app.description_edit import exclude_row, include_row, write_description
+from bowdenfit.addons.app.description_edit import exclude_part, include_part, write_description
 from bowdenfit.addons.app.draft import list_refusals
 from bowdenfit.addons.app.measured_rows import LEFT_OUT, READ, REFUSED, collect_rows
-from bowdenfit.addons.app.points import row_key
+from bowdenfit.addons.app.points import parse_sample_key, row_key
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.recordings.recording import Recordings
 
 DATASETS = Path(__file__).parents[3] / "datasets"
 ROWS = ["20,15.2,1", "40,30.1,1", "60,45.6,1", "20,15.0,2", "40,30.9,2", "60,46.0,2"]
@@ -42,6 +44,16 @@ def points_of(pictures, label):
     return sorted((float(x), float(y), key) for some in places for x, y, key in some)
 
 
+def test_a_row_that_is_refused_counts_once_though_it_is_several_points(tmp_path):
+    folder = shutil.copytree(DATASETS / "on-body-exoskeleton", tmp_path / "on-body")
+    text = (folder / "angles.csv").read_text().replace("450,30,11", "450,-30,11")
+    (folder / "angles.csv").write_text(text)
+    with pytest.raises(BowdenfitError) as refusal:
+        bf.check(folder)
+    pictures = make_pictures(collect_rows(folder, list_refusals(refusal.value)))
+    assert len(points_of(pictures, "Refused")) == 2 and "Red, refused: 1." in pictures[0].chart_caption
+
+
 def test_every_reading_is_a_point_that_is_called_as_its_row(bench):
     measured = collect_rows(bench)
     table = bf.read(bench).measurements.table(ForceTable)
@@ -53,9 +65,9 @@ def test_every_reading_is_a_point_that_is_called_as_its_row(bench):
 
 def test_a_row_is_left_out_with_its_reason_and_taken_in_again(bench):
     original = (bench / "cable.toml").read_text()
-    exclude_row(bench, "forces", "forces.csv", 3, "the  rope\njumped")
-    exclude_row(bench, "forces", "forces.csv", 6, "the rope jumped")
-    exclude_row(bench, "forces", "forces.csv", 4, "typed twice")
+    exclude_part(bench, "forces", "forces.csv", 3, "the  rope\njumped")
+    exclude_part(bench, "forces", "forces.csv", 6, "the rope jumped")
+    exclude_part(bench, "forces", "forces.csv", 4, "typed twice")
     text = (bench / "cable.toml").read_text()
     entries = tomllib.loads(text)["tables"]["forces"]["exclude"]
     assert entries == [{"rows": [3, 6], "reason": "the rope jumped"}, {"rows": [4], "reason": "typed twice"}]
@@ -66,7 +78,7 @@ def test_a_row_is_left_out_with_its_reason_and_taken_in_again(bench):
     assert gray == [(40.0, 30.1, "3 forces.csv"), (40.0, 30.9, "6 forces.csv"), (60.0, 45.6, "4 forces.csv")]
     assert "3 readings left out by the user" in str(bf.check(bench))
     for row in (3, 6, 4):
-        include_row(bench, "forces", "forces.csv", row)
+        include_part(bench, "forces", "forces.csv", row)
     assert (bench / "cable.toml").read_text() == original
 
 
@@ -85,8 +97,8 @@ def test_refused_rows_are_red_and_the_others_are_drawn_all_the_same(bench):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda folder: exclude_row(folder, "forces", "forces.csv", 3, " "), "write why row 3 is left out"),
-        (lambda folder: exclude_row(folder, "angles", "forces.csv", 3, "x"), "has no table angles"),
+        (lambda folder: exclude_part(folder, "forces", "forces.csv", 3, " "), "write why row 3 is left out"),
+        (lambda folder: exclude_part(folder, "angles", "forces.csv", 3, "x"), "has no table angles"),
         (lambda folder: write_description(folder, "name = "), "this is no TOML"),
         (lambda folder: write_description(folder, 'name = "x"\n'), "contact"),
     ],
@@ -103,7 +115,7 @@ def test_a_description_that_is_a_link_is_not_written_through(bench, tmp_path_fac
     shutil.move(bench / "cable.toml", other)
     (bench / "cable.toml").symlink_to(other)
     with pytest.raises(BowdenfitError, match="link"):
-        exclude_row(bench, "forces", "forces.csv", 3, "x")
+        exclude_part(bench, "forces", "forces.csv", 3, "x")
     assert "exclude" not in other.read_text()
 
 
@@ -116,6 +128,16 @@ def test_the_curves_that_would_be_fitted_follow_the_angles():
     angles = {(470, 0): 19.0, (520, 0): 91.0, (440, 1): 45.0}  # of the paper's table, deg
     for (length, column), angle in angles.items():
         assert np.interp(length, group.x, group.series[column].values) == pytest.approx(angle, abs=3)
+
+
+def test_rows_that_are_left_out_are_drawn_in_every_table_of_a_loop(tmp_path):
+    folder = shutil.copytree(DATASETS / "synthetic-haptic-loop", tmp_path / "loop")
+    kinds = [file.kind for file in collect_rows(folder).files]
+    for kind in kinds:
+        exclude_part(folder, kind, f"{kind}.csv", 4, "the rope jumped")
+    for picture in make_pictures(collect_rows(folder)):
+        assert [key for _, _, key in points_of([picture], "Left out by you")] == [f"4 {picture.name[5:]}.csv"]
+    assert {"stretch", "preload", "loop"} <= {*kinds}
 
 
 @pytest.mark.parametrize(
@@ -143,8 +165,33 @@ def test_a_ring_down_is_drawn_over_the_time_from_its_release(tmp_path):
     assert chart.y_label == "Angle (deg)" and group.x[0] == 0 and group.x[-1] == pytest.approx(0.249)
     assert group.series[0].values == pytest.approx(np.rad2deg(angle), abs=1e-3)
     assert group.series[0].keys[0] == row_key("ringdown.csv", 2)
+    exclude_part(tmp_path, "ringdown", "ringdown.csv", 12, "bumped")
+    (place,) = points_of([p for p in make_pictures(collect_rows(tmp_path)) if p.name == "data-ringdown"], "Left out by you")
+    assert place == (pytest.approx(0.010), pytest.approx(np.rad2deg(angle[10]), abs=1e-3), "12 ringdown.csv")
+
+
+def test_stretches_and_whole_recordings_are_left_out_by_the_clock_of_the_recording(tmp_path):
+    folder = write(RecordedBench(rate=100.0, length=60.0, mountings=2), tmp_path / "bench", seed=4)
+    text, rows = (folder / "cable.toml").read_text(), (folder / "r1.csv").read_text().splitlines()
+    late = [f"{float(row.split(',')[0]) + 500:.2f},{row.split(',', 1)[1]}" for row in rows[1:]]
+    (folder / "r1.csv").write_text("\n".join([rows[0], *late, ""]))
+    measured = collect_rows(folder)
+    (picture,) = make_pictures(measured)
+    number, time = parse_sample_key(picture.charts[1].groups[0].series[0].keys[0])
+    assert measured.find_recorded(number).file == "r1.csv" and time == pytest.approx(500, abs=0.5)
+    assert "leave a stretch out" in picture.chart_caption
+    for part in ((520.0, 526.5), (540.0, 541.0)):
+        exclude_part(folder, "recordings", "r1.csv", part, "leaned on it")
+    exclude_part(folder, "recordings", "r0.csv", None, "the clamp slipped")
+    excluded = {file.file: file.excluded for file in collect_rows(folder).recorded}
+    assert excluded["r1.csv"] == (((520.0, 526.5), "leaned on it"), ((540.0, 541.0), "leaned on it"))
+    assert excluded["r0.csv"] == ((None, "the clamp slipped"),)
+    assert [item.file for item in bf.read(folder).measurements.table(Recordings).items] == ["r1.csv"]
+    for file, part in (("r1.csv", (520.0, 526.5)), ("r0.csv", None), ("r1.csv", (540.0, 541.0))):
+        include_part(folder, "recordings", file, part)
+    assert (folder / "cable.toml").read_text() == text
 
 
 def test_a_reason_is_needed(bench):
     with pytest.raises(UsageError, match="200 characters"):
-        exclude_row(bench, "forces", "forces.csv", 3, "x" * 201)
+        exclude_part(bench, "forces", "forces.csv", 3, "x" * 201)

@@ -66,6 +66,18 @@ def test_the_figures_show_the_stretch_gray(folder):
     assert [series.color for group in chart.groups for series in group.series if series.label == LEFT_OUT] == ["gray"]
 
 
+def test_a_recording_that_is_left_out_is_not_read_but_kept_as_one_of_the_data(folder, tmp_path):
+    (folder / "r0.csv").write_text("no recording")
+    with pytest.raises(DatasetError, match="r0"):
+        bf.read(folder)
+    leave_out(folder, '{ file = "r0.csv", reason = "the clamp slipped" }')
+    sentence = "1 recording left out by the user: r0.csv (the clamp slipped)."
+    dataset = bf.read(folder)
+    assert [item.file for item in dataset.measurements.table(Recordings).items] == ["r1.csv"]
+    assert sentence in dataset.measurements.remarks and sentence in " ".join(describe_data_set(bf.check(folder)).split())
+    assert {"r0.csv", "r1.csv"} <= {*dataset.sha256}, "else it would seem to be added after the fit"
+
+
 @pytest.mark.parametrize(
     ("entry", "error", "words"),
     [
@@ -75,6 +87,8 @@ def test_the_figures_show_the_stretch_gray(folder):
         ("{ file = 'r0.csv', start = -1, end = 80, reason = 'x' }", DatasetError, "fewer than 20 readings"),
         ("{ file = 'r0.csv', start = 2, end = 1, reason = 'x' }", DescriptionError, "must start before it ends"),
         ("{ file = 'r0.csv', start = 1, end = 2 }", DescriptionError, "reason"),
+        ("{ file = 'r0.csv', start = 1, reason = 'x' }", DescriptionError, "needs start and end"),
+        ("{ file = 'r0.csv', reason = 'x' }, { file = 'r1.csv', reason = 'x' }", DatasetError, "leaves out every recording"),
         ("{ file = 'r0.csv', rows = [7], reason = 'x' }", DescriptionError, "rows"),
     ],
 )

@@ -10,6 +10,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.physics.ring_down import ring_down
+from bowdenfit.plots.style import LEFT_OUT
 from bowdenfit.questions.bends import ring_down_figure
 
 J, K, B, F = 1e-3, 20.0, 4e-3, 0.08
@@ -110,6 +111,23 @@ def test_torque_tells_the_same_as_angle(tmp_path):
     for name, truth in NAMES.items():
         estimate = fit.parameter(name)
         assert abs(estimate.mean - truth) < 4 * estimate.sd and estimate.sd < 0.1 * truth, name
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize(("heading", "unit"), [("angle_rad", 180 / np.pi), ("torque_N_m", 1.0)])
+def test_readings_that_are_left_out_are_gray_at_their_time_since_their_release(tmp_path, heading, unit):
+    is_torque = heading == "torque_N_m"
+    (time, first), (_, second) = swung(torque=is_torque), swung(1e-3, seed=1, torque=is_torque)
+    folder_of(tmp_path, [(0.0, (time + 3, first)), (1e-3, (time + 3, second))], heading=heading)
+    text, rows = (tmp_path / "cable.toml").read_text(), [10, len(time) + 1, len(time) + 2, len(time) + 12]
+    exclude = f'file = "ringdown.csv", exclude = [{{ rows = {rows}, reason = "bumped" }}]'
+    (tmp_path / "cable.toml").write_text(text.replace('file = "ringdown.csv"', exclude))
+    runs = ring_down_figure.data(bf.fit(tmp_path, seed=1, mcmc=False))
+    expected = [[(time[8], first[8]), (time[-1], first[-1])], [(-1e-3, second[0]), (time[9], second[10])]]
+    for run, places in zip(runs, expected, strict=True):
+        np.testing.assert_allclose(run.left_out.T, np.array(places) * [1, unit], atol=1e-6)
+    assert "4 readings left out by the user" in ring_down_figure.caption(runs)
+    assert LEFT_OUT in ring_down_figure.draw(runs).axes[0].get_legend_handles_labels()[1]
 
 
 @pytest.mark.extended

@@ -11,7 +11,7 @@ from recorded_benches import RecordedBench, write
 
 DATASETS = Path(__file__).parents[3] / "datasets"
 pytestmark = pytest.mark.extended
-LOOKS = [(1280, "light"), (1280, "dark"), (390, "light"), (390, "dark")]
+LOOKS = [(1280, "light"), (390, "dark")]
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ UNKNOWN = "How much later the output channel is than the input channel cannot be
 COMMON_ERROR = 0.0015  # [s]; what is left over the 24 simulated benches (scripts/check_recordings.py simulates others)
 _FRICTIONS = np.linspace(0.3, 1.2, 10)  # of half the width of the loop, which delay and noise make wider: the start of a search
 _COARSE_ROWS = 3  # judged: stretches that the coarse search looks at
-_ROUNDS = 2  # judged: of delay and rests in turn
+_ROUNDS, _DRAG_ROUNDS = 2, 3  # judged: of delay and rests in turn
 _SOME_DRAG = 0.1  # of the typical force; judged: the drag at which a second search starts
 _AS_WELL = 1.2  # judged: ratio of sums of squares up to which two drags describe a recording as well
 _MOST_RATIO = 10.0  # judged: log ratio of the sensors beyond any gain
@@ -93,9 +93,9 @@ def estimate_delay(
         return _undetermined("the force never turns around")
     start = _coarse(segments)
     segments = _touched(segments, start)
-    point, _ = _refined(segments, None, start)
+    point = _refined(segments, None, start)
     for _ in range(_ROUNDS):
-        point, _ = _refined(segments, read_rests(segments, point), point)
+        point = _refined(segments, read_rests(segments, point), point)
     point, error = _with_drag_too(segments, point)
     sd = float(np.hypot(error, COMMON_ERROR))
     if not _slides_both_ways(segments, point):
@@ -116,19 +116,23 @@ def _with_drag_too(segments: Segments, point: Vector) -> tuple[ChosenVector, flo
     """Return exponent, ratio, delay and drag, and the standard error of the delay but for what all recordings have in common.
 
     A drag looks like a delay where the force changes at a constant rate: it is looked for from none and from some of it, and
-    where both explain the recording about as well, how far they are apart is an error.
+    where both explain the recording about as well, how far they are apart is an error. Each point is judged with the rests
+    that are read at it: with those of another a step that only leads away along the drag seems to be a better one.
     """
-    some = _SOME_DRAG * float(np.exp(np.median(segments.y)))
+    some, weight = _SOME_DRAG * float(np.exp(np.median(segments.y))), np.sqrt(_inner(segments))
     fits = []
     for start in (np.append(point, 0.0), np.array([point[0], point[1], 0.0, some])):
-        for _ in range(_ROUNDS):
+        seen = []
+        for _ in range(_DRAG_ROUNDS + 1):
             rests = read_rests(with_drag(segments, float(start[3])), start[:3])
-            start, covariance = _refined(segments, rests, start)
-        residuals, _ = _linearized(segments, rests, np.sqrt(_inner(segments)), start, start[3:])
-        fits.append((float(residuals @ residuals), start, float(covariance[2, 2]), _by_noise(segments, residuals)))
-    (least, best, variance, by_noise), (more, other, *_) = sorted(fits, key=lambda fit: fit[0])
+            residuals, slopes = _linearized(segments, rests, weight, start, start[3:])
+            seen.append((float(residuals @ residuals), start, residuals, slopes))
+            start = _refined(segments, rests, start)
+        fits.append(min(seen, key=lambda fit: fit[0]))
+    (least, best, residuals, slopes), (more, other, *_) = sorted(fits, key=lambda fit: fit[0])
     apart = (best[2] - other[2]) / 2 if more < _AS_WELL * least else 0.0
-    return best, float(np.sqrt(variance + by_noise**2 + apart**2))
+    variance = _covariance(residuals, slopes)[2, 2]
+    return best, float(np.sqrt(variance + _by_noise(segments, residuals) ** 2 + apart**2))
 
 
 def _slides_both_ways(segments: Segments, point: ChosenVector) -> bool:
@@ -197,8 +201,8 @@ def _touched(segments: Segments, point: OtherVector) -> Segments:
     return replace(segments, weight=np.where(known, segments.weight, 0.0))
 
 
-def _refined(segments: Segments, rests: Rests | None, start: Vector) -> tuple[Vector, Matrix]:
-    """Gauss-Newton from a good start, each step taken only if it helps; the last point and its covariance."""
+def _refined(segments: Segments, rests: Rests | None, start: Vector) -> Vector:
+    """Return the last point of Gauss-Newton from a good start, each step taken only if it helps."""
     weight = np.sqrt(_inner(segments))
     point, damping, initial_drag = start, 1.0, start[3:]
     residuals, slopes = _linearized(segments, rests, weight, point, initial_drag)
@@ -216,9 +220,14 @@ def _refined(segments: Segments, rests: Rests | None, start: Vector) -> tuple[Ve
         point, residuals, slopes = tried, new_residuals, new_slopes
         if abs(step[2]) < 5e-5:
             break
-    freedom = max(int(np.count_nonzero(weight)) - 5, 1)
+    return point
+
+
+def _covariance(residuals: np.ndarray, slopes: np.ndarray) -> Matrix:
+    """Return the covariance of the parameters by what `_linearized` returns."""
+    freedom = max(len(residuals) - 5, 1)
     variance = float(residuals @ residuals) / freedom * correlation_time(residuals)
-    return point, variance * np.linalg.pinv(slopes.T @ slopes)
+    return np.asarray(variance * np.linalg.pinv(slopes.T @ slopes))
 
 
 def _linearized(

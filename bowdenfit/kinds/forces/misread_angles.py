@@ -1,4 +1,4 @@
-"""Wrap angles that are off by half or whole turns: readings of one run at equal loads whose friction differs by a factor.
+"""Wrap angles off by half or whole turns, as readings of one run whose friction differs by a factor show; and radians.
 
 450 deg is easily written as 90. Nothing that a mounting does explains rows of one run at one angle and equal loads that lose
 twice as much as others; the turns that would explain it are those with which all groups of rows have one friction coefficient.
@@ -20,6 +20,8 @@ _FEWEST = 2  # readings of each part, and loads at which both were read
 _EQUAL_LOADS = 0.1  # relative difference
 _ALIKE = 0.1  # relative difference of friction coefficients that turns have explained
 _MOST_TURNS = 4  # half turns that a note of an angle may lack
+_RADIANS = 15.0  # friction coefficient at angles that may be radians, over that at the others, of which 57 are a radian
+_AGREE = 1.5  # ratio of friction coefficients of different mountings that are alike
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,15 @@ class _Group:
 
 
 def describe_misread_angles(table: ForceTable, description: Description) -> str:
-    """Describe runs whose readings at one angle and equal loads differ by a factor of two; empty if there are none.
+    """Describe runs whose readings at one angle and equal loads differ by a factor of two, or radians; empty without either.
 
     Only cables whose one contact has the angles of its rows are looked at.
     """
     if len(description.contact) != 1 or table.own.angle.shape[1] != 1 or not np.isfinite(table.own.angle).all():
         return ""
     groups = _group_rows(table)
+    if sentence := _describe_radians(table, groups):
+        return sentence
     split = [group for group in groups if group.is_split]
     if not split:
         return ""
@@ -70,6 +74,27 @@ def describe_misread_angles(table: ForceTable, description: Description) -> str:
     return (
         f"{seen}. All rows have one friction coefficient if these angles were noted wrongly by half or whole turns: "
         f"{'; '.join(wrong)}. Correct them if that is how the cable was wrapped."
+    )
+
+
+def _describe_radians(table: ForceTable, groups: list[_Group]) -> str:
+    """Describe rows that lose as if their angles were radians in a column of degrees; empty if there are none."""
+    coefficients = np.array([group.loss / group.angle for group in groups])
+    order = np.argsort(coefficients)
+    if len(groups) < 2 or coefficients[order[0]] <= 0:
+        return ""
+    cut = int(np.argmax(coefficients[order][1:] / coefficients[order][:-1])) + 1
+    low, high = coefficients[order[:cut]], coefficients[order[cut:]]
+    ends = np.append(low, np.deg2rad(high))
+    if high.min() < _RADIANS * low.max() or ends.max() > _AGREE * ends.min():
+        return ""
+    wrong = []
+    for group in (groups[i] for i in sorted(order[cut:])):
+        read = float(np.rad2deg(table.own.angle[group.rows[0], 0]))
+        wrong.append(f"{read:.4g} in {_name_rows(table, group)}, which would be {np.rad2deg(read):.0f} deg")
+    return (
+        f"Some wrap angles in {listed(table.origin.files)} seem to be radians in a column of degrees, since their readings "
+        f"lose as the others do only then: {'; '.join(wrong)}. Correct them, with all angles in one unit."
     )
 
 

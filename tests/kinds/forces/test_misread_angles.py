@@ -101,3 +101,12 @@ def test_such_a_table_is_not_trusted_and_check_warns_of_it(tmp_path):
     verdict = bf.fit(file, mcmc=False).verdict()
     assert "where 450 deg fits" in " ".join(verdict.troubles["contradictory"])
     assert "where 450 deg fits" in " ".join(str(bf.check(file)).split())
+
+
+def test_radians_in_a_column_of_degrees_are_named():
+    rng, true = np.random.default_rng(3), [45.0, 45.0, 90.0, 90.0, 180.0, 270.0]
+    for noted in ([*true[:4], np.pi, 1.5 * np.pi], [*np.deg2rad(true[:5]), 270.0]):
+        table = bench_table(rng, true, noted, mu=0.12, tau=0.02, noise=0.01, run_of_angle=False)
+        words = describe_misread_angles(table, DESCRIPTION)
+        assert "seem to be radians" in words and "3.142 in rows" in words and "which would be 180 deg" in words
+        assert ("45" in words.split(";")[0]) == (noted[0] < 1)

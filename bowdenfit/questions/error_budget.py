@@ -181,8 +181,7 @@ def with_bench_errors(fit: Record) -> Record:
     Its draws of parameters, and what follows from them, are those that people copy. What depends on readings, as the log
     likelihood, is left out: readings have the errors, parameters have not.
     """
-    learned = learned_errors(fit)
-    if learned is None or fit.draws().has_bench_errors:
+    if fit.sampled is None or fit.sampled.has_bench_errors or (learned := learned_errors(fit)) is None:
         return fit
     draws = fit.draws()
     z = draws.flat_z + learned.draw(len(draws.flat_z), fit.provenance.seed) @ learned.moves.T

@@ -282,9 +282,16 @@ def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
     if not have_same_numbers(one.values, other.values):
         return
     what = "the same channel" if one is other else f"copies of each other, {shown(other.name)} having the same numbers"
+    headings = [(channel.name, channel.unit) for channel in file.channels if not is_clock(channel)]
+    others = [heading for heading in headings if heading[0] not in (one.name, other.name)]
+    remedy = "this file has no other; record both ends, or join the file of the other logger (--join FILE)"
+    if likely := rank_headings(others, "force"):
+        name, below = others[likely[0]]
+        quantity = "input_force" if find_candidates([(name, below)], WANTED).get("input_force") else "output_force"
+        remedy = f"name the other cell: {option_naming(quantity, name, unit_to_state(name, below, 'N'), '--channel')}"
     raise DatasetError(
         f"{file.path.name}: input_force and output_force are {what} ({shown(one.name)}), as if there were no friction at "
-        "all; name the channels of the two load cells: --channel input_force=NAME:N --channel output_force=NAME:N."
+        f"all; {remedy}."
     )
 
 
@@ -327,9 +334,11 @@ def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: Co
         return channel.time
     if time is not None:
         return converted(file, time, "time", source, "time")
+    rising = [other.name for other in file.channels if len(other.values) > 1 and np.all(np.diff(other.values) > 0)]
+    by_name = f"name the channel of the time, {option_naming('time', rising[0], 's', '--channel')}, or " if rising else ""
     raise DatasetError(
-        f"{file.path.name}: the channel {shown(channel.name)} has no clock; name the channel of the time, --channel "
-        "time=NAME:s, or state the sampling rate, --channel time=1000Hz."
+        f"{file.path.name}: the channel {shown(channel.name)} has no clock; {by_name}state the sampling rate, such as "
+        "--channel time=1000Hz."
     )
 
 

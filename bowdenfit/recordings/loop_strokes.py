@@ -1,5 +1,6 @@
 """What a recording of a pull-pull loop says of its phases: the play operator of its two sides that follows it best."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -201,9 +202,10 @@ def _check_ends(fit: Hysteresis, file: str, name: str, channels: tuple[str, str]
     if fit.cost < _COST_OF_NOISE:  # it follows to within its noise, which neither could
         return
     if np.ptp(force_in) > 0 and np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < _OPPOSITE:
+        option = f": --channel {shlex.quote(f'output_force={channels[1]}:-N')}" if channels[1] else ""
         raise DatasetError(
             f"{file}: in {name!r} the output force falls where the input force rises; both must be positive in the same "
-            "direction of motion. Turn the sign of one by a minus before its unit, such as --channel output_force=NAME:-N."
+            f"direction of motion. Turn the sign of one by a minus before its unit{option}."
         )
     other = fit_force_loop(force_out, force_in)
     if other.cost < _CLEARLY * fit.cost:

@@ -5,6 +5,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.questions.loss import ContactShare, LossByContact, loss_by_contact, loss_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
@@ -18,6 +19,7 @@ def fit(quick_fit):
 
 def test_shares_are_coefficient_times_angle_over_their_sum_draw_by_draw(fit):
     losses = loss_by_contact(fit)
+    fit = with_bench_errors(fit)
     best_length = float(np.median(fit.posterior.optimum["optimal_length"]))
     grid, curves = fit.along_route.grid, fit.along_route.curves
 

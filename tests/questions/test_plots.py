@@ -409,6 +409,12 @@ def test_densities_of_very_small_and_very_large_quantities_have_short_numbers(fo
     assert not axes.yaxis.get_offset_text().get_text()
 
 
+class Stub(SimpleNamespace):
+    """Something that answers may be cached for."""
+
+    __hash__ = object.__hash__
+
+
 def fit_of_nine():
     """As much of a fit of nine coefficients as the pair plot asks for."""
     draws = {f"mu{i}": np.random.default_rng(i).uniform(0.1, 0.2, (WALKERS, DRAWS)) for i in range(9)}
@@ -416,8 +422,9 @@ def fit_of_nine():
     lengths = np.random.default_rng(9).uniform(460.0, 480.0, (WALKERS, DRAWS))
     optimum = {OPTIMAL_LENGTH: lengths, OPTIMAL_EFFICIENCY: np.full(lengths.shape, 0.79) + 1e-4 * lengths}
     route = SimpleNamespace(variable="cable_length", unit="mm", range=RANGE)
-    return SimpleNamespace(
-        sampled=SimpleNamespace(values=draws, optimum=optimum), model=SimpleNamespace(space=SimpleNamespace(free=free)),
+    return Stub(
+        sampled=SimpleNamespace(values=draws, optimum=optimum, has_bench_errors=True),
+        model=SimpleNamespace(space=SimpleNamespace(free=free)),
         dataset=SimpleNamespace(description=SimpleNamespace(route=route)),
     )  # fmt: skip
 

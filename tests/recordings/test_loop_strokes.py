@@ -146,8 +146,9 @@ def test_swapped_channels_are_refused():
 
 def test_channels_that_count_opposite_directions_are_refused():
     columns = recorded()
-    with pytest.raises(DatasetError, match="output_force=NAME:-N"):
-        strokes_of(columns | {"output_force_N": -columns["output_force_N"]})
+    blocks, _ = prepared(columns | {"output_force_N": -columns["output_force_N"]})
+    with pytest.raises(DatasetError, match="--channel 'output_force=load cell:-N'"):
+        find_strokes(blocks, "run.csv", "run", (), LoopStrokes(None, ("motor", "load cell")))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.3])

@@ -242,7 +242,7 @@ CHANNELS = [
     (["input_force=input_force_N:quux"], ["'quux'", "not known"]),
     (
         ["input_force=output_force_N"],
-        ["run.csv", "the same channel ('output_force_N')", "--channel input_force=NAME:N"],
+        ["run.csv", "the same channel ('output_force_N')", "--channel input_force=input_force_N."],
     ),
     (["input_force=input_force_N", "input_force=output_force_N"], ["input_force twice", "keep one"]),
     (["velocity=input_force_N"], ["'input_force_N'", "'N'", "mm/s"]),

@@ -56,10 +56,8 @@ TABLES = {
         "Over The Edge Rescue, *Pulley versus carabiner efficiency* (2016): section 3, carabiner results",
         "largest force of five raises of 10 kg",
         "The efficiency is 53 %, the load over the mean of the five.",
-        "Readings of 0.18 and 0.20 kN are one increment of the cell apart, at the same load. The fitted load "
-        "follows the reading, so a larger reading is both a larger load and a larger loss, and bowdenfit reports "
-        "friction that depends on load. With one load only that cannot be known: here its distrust is a false alarm. The "
-        "median is the authors' value.",
+        "Readings of 0.18 and 0.20 kN are one increment of the cell apart, at the same load. With one load only, a larger "
+        "reading is taken for both a larger load and a larger loss. The median is the authors' value.",
     ),
     "published/pulley-raise": (
         "Climbing rope over a small pulley, raised",

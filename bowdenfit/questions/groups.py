@@ -10,7 +10,6 @@ import numpy as np
 from bowdenfit.cable.registry import coefficient_of
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.error_budget import with_bench_errors
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import decimals, filled, listed
 
@@ -117,7 +116,7 @@ def contrast_groups(fit: Record) -> Groups | None:
     names = fit.model.cable.friction.groups
     if not names or fit.sampled is None:
         return None
-    return Groups(names, names[0], tuple(_contrasts(with_bench_errors(fit), names)))
+    return Groups(names, names[0], tuple(_contrasts(fit, names)))
 
 
 def _contrasts(fit: Record, names: tuple[str, ...]) -> Iterator[Contrast]:

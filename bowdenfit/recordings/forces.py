@@ -30,6 +30,7 @@ _CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _CLOCK_WORDS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
 _MOST_TOGETHER, _FEWEST_ROWS = 0.5, 0.9  # shares of rows with both forces, and with one, in a table that joins two clocks
+_LONGEST_NAME = 80  # judged: letters of a channel's name that a message repeats
 _SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
 
 
@@ -283,8 +284,8 @@ def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
         return
     what = "the same channel" if one is other else f"copies of each other, {shown(other.name)} having the same numbers"
     headings = [(channel.name, channel.unit) for channel in file.channels if not is_clock(channel)]
-    others = [heading for heading in headings if heading[0] not in (one.name, other.name)]
-    remedy = "this file has no other; record both ends, or join the file of the other logger (--join FILE)"
+    others = [heading for heading in headings if heading[0] not in (one.name, other.name) and len(heading[0]) < _LONGEST_NAME]
+    remedy = "if this file has no other, record both ends, or join the file of the other logger (--join FILE)"
     if likely := rank_headings(others, "force"):
         name, below = others[likely[0]]
         quantity = "input_force" if find_candidates([(name, below)], WANTED).get("input_force") else "output_force"

@@ -126,6 +126,6 @@ def test_a_sampler_of_ones_own_agrees_with_the_fit(tmp_path):
         if step >= 1500 and step % 15 == 0:
             history.append(z)
     mu = np.asarray(jax.vmap(model.constrain)(jnp.asarray(np.concatenate(history)))["mu"])
-    interval = bf.fit(tmp_path / "t.csv", seed=2).parameter("mu")
+    interval = bf.fit(tmp_path / "t.csv", seed=2).parameter_of_draws("mu")
     assert np.median(mu) == pytest.approx(interval.median, abs=0.25 * interval.sd)
     assert np.quantile(mu, 0.05) == pytest.approx(interval.q05, abs=0.5 * interval.sd)

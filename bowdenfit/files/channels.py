@@ -6,6 +6,7 @@ left out.
 """
 
 import importlib
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,8 @@ from bowdenfit.files.pieces import subsample
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.types import Vector
 from bowdenfit.words import quoted
+
+_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")  # of a column, behind the name of its array
 
 LARGEST_BYTES = 2 * 1024**3
 """The most that the samples of one file may need in memory, as 64-bit numbers [bytes]."""
@@ -242,6 +245,26 @@ def refuse_larger(path: Path, most: int, remedy: str) -> None:
 def is_numeric(dtype: np.dtype[Any]) -> bool:
     """Return whether values of this type are real numbers, or true and false."""
     return dtype.kind in "fiub"
+
+
+def name_columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield a vector, or the columns (or rows, if these are longer) of a matrix, with names such as "data[:,0]".
+
+    Args:
+        name: Name of the array.
+        values: The array, of one or two dimensions.
+    """
+    if values.ndim == 1 or min(values.shape) == 1:
+        yield name, values
+        return
+    tall = values.shape[0] >= values.shape[1]
+    for number, column in enumerate(values.T if tall else values):
+        yield f"{name}[:,{number}]" if tall else f"{name}[{number},:]", column
+
+
+def strip_index(name: str) -> str:
+    """Return the name of an array by that of one of its columns, such as "data" of "data[:,0]" or "data(:,1)"."""
+    return _INDEX.sub("", name)
 
 
 def to_floats(values: np.ndarray) -> Vector:

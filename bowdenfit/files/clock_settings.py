@@ -1,7 +1,6 @@
 """The times of channels by single values that a file holds next to them: its sampling rate, and when each channel starts."""
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel
+from bowdenfit.files.channels import Channel, strip_index
 from bowdenfit.files.clocks import EPOCH_UNITS, YEARS, groups_around, is_clock, is_date, parse_dates
 
 _RATE_NAMES = {
@@ -24,7 +23,6 @@ _START_NAMES = {
     "t0", "tstart", "tfirst", "toffset", "starttime", "startdate", "timestart", "timeoffset", "timezero", "wfstartoffset",
     "wfstarttime",
 }  # fmt: skip
-_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")
 
 Settings = Mapping[str, Mapping[str, Any]]
 """Single values by name, such as the attributes of a data set, for each data set and group: "bench" or "rec.run"."""
@@ -67,7 +65,7 @@ def _nearest(name: str, settings: Settings) -> tuple[float, str] | None:
 
 def _owners(name: str) -> tuple[str, ...]:
     """Return whose settings are those of a channel: itself, its group and those around it."""
-    return (_INDEX.sub("", name), *(group[:-1] for group in groups_around(name)))
+    return (strip_index(name), *(group[:-1] for group in groups_around(name)))
 
 
 def _first_times(name: str, settings: Settings) -> tuple[float, float | None]:
@@ -87,8 +85,8 @@ def _start(value: Any) -> float | None:
     """Return a number of seconds, or the Unix time of a date in a text [s]; None for anything else."""
     array = np.asarray(value)
     item = array.reshape(-1)[0] if array.size == 1 else None
-    if array.size == 1 and array.dtype.kind in "fiu":
-        seconds = float(array.reshape(-1)[0])
+    if item is not None and array.dtype.kind in "fiu":
+        seconds = float(item)
         scale = next((factor for bound, factor in EPOCH_UNITS if abs(seconds) > bound), 1.0)
         return seconds * scale if math.isfinite(seconds) else None
     text = item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item or "")

@@ -13,6 +13,7 @@ from bowdenfit.files.channels import (
     UnreadNames,
     is_numeric,
     make_channel_file,
+    name_columns,
     refuse_damage,
     refuse_too_large,
     to_floats,
@@ -104,12 +105,9 @@ def _channels(dataset: Any, left_out: UnreadNames) -> Iterator[Channel]:
     values, named = dataset[()], unit or unit_in_name(name)
     if values.dtype.names:
         yield from _fields(name, unit, values, left_out)
-    elif values.ndim == 1 or min(values.shape) == 1:
-        yield Channel(name, named, to_floats(values))
     else:
-        tall = values.shape[0] >= values.shape[1]
-        for number, column in enumerate(values.T if tall else values):
-            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", named, to_floats(column))
+        for column_name, column in name_columns(name, values):
+            yield Channel(column_name, named, to_floats(column))
 
 
 def _fields(name: str, unit: str, values: np.ndarray, left_out: UnreadNames) -> Iterator[Channel]:

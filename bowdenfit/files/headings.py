@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from bowdenfit.errors import DatasetError, suggest_name
+from bowdenfit.files.channels import strip_index
 from bowdenfit.files.clocks import names_time, unit_of_time
 from bowdenfit.files.spellings import names_force, parse_heading
 from bowdenfit.units import ColumnSource, differing_units, is_unit, measures, weight_of
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
-_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")  # of a column, behind the name of its table
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 # `F_in` is no force in inches, nor `cell_A` one in ampere: behind a name only what cannot be a word counts as unit.
 _SUFFIXES = (
@@ -89,7 +89,7 @@ def heading_of(text: str, unit: str = "") -> Heading:
 
 def unit_in_name(name: str) -> str:
     """Return the unit in the last part of the name of a channel, such as "rec.F_in_N" or "bench/t_ms"; empty without one."""
-    return heading_of(re.split(r"[/.](?=[^/.]+$)", _INDEX.sub("", name))[-1]).unit
+    return heading_of(re.split(r"[/.](?=[^/.]+$)", strip_index(name))[-1]).unit
 
 
 def _unit_behind(heading: str) -> str:

@@ -14,6 +14,7 @@ from bowdenfit.files.channels import (
     UnreadNames,
     is_numeric,
     make_channel_file,
+    name_columns,
     refuse_damage,
     refuse_too_large,
     to_floats,
@@ -80,9 +81,6 @@ def _channels(name: str, values: np.ndarray, left_out: UnreadNames) -> Iterator[
         left_out.add(name, "they are text, complex numbers or objects")
     elif values.ndim > 2 or (values.ndim == 2 and min(values.shape) > _MOST_COLUMNS):
         left_out.add(name, f"they have more than two dimensions or {_MOST_COLUMNS} columns")
-    elif values.ndim == 1 or min(values.shape) == 1:
-        yield Channel(name, unit_in_name(name), to_floats(values))
     else:
-        tall = values.shape[0] >= values.shape[1]
-        for number, column in enumerate(values.T if tall else values):
-            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", unit_in_name(name), to_floats(column))
+        for column_name, column in name_columns(name, values):
+            yield Channel(column_name, unit_in_name(name), to_floats(column))

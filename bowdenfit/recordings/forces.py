@@ -284,10 +284,11 @@ def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
         return
     what = "the same channel" if one is other else f"copies of each other, {shown(other.name)} having the same numbers"
     headings = [(channel.name, channel.unit) for channel in file.channels if not is_clock(channel)]
-    others = [heading for heading in headings if heading[0] not in (one.name, other.name) and len(heading[0]) < _LONGEST_NAME]
+    names = one.name, other.name
+    candidates = [heading for heading in headings if heading[0] not in names and len(heading[0]) < _LONGEST_NAME]
     remedy = "if this file has no other, record both ends, or join the file of the other logger (--join FILE)"
-    if likely := rank_headings(others, "force"):
-        name, below = others[likely[0]]
+    if likely := rank_headings(candidates, "force"):
+        name, below = candidates[likely[0]]
         quantity = "input_force" if find_candidates([(name, below)], WANTED).get("input_force") else "output_force"
         remedy = f"name the other cell: {option_naming(quantity, name, unit_to_state(name, below, 'N'), '--channel')}"
     raise DatasetError(

@@ -274,8 +274,8 @@ def contact_name_question(words: str, default: str | None, taken: Collection[str
         return name
 
     proposed = None if default in taken else default
-    why = "two places would have the same name." if default else "a place where the rope rubs needs a name."
-    return Question(words, read, proposed, "" if proposed else why, "edge")
+    reason = "two places would have the same name." if default else "a place where the rope rubs needs a name."
+    return Question(words, read, proposed, "" if proposed else reason, "edge")
 
 
 def coefficient_name_question(words: str, default: str, columns: Collection[str]) -> Question[str]:

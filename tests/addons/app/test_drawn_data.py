@@ -122,8 +122,8 @@ DRAW_BOX = """() => {
   document.querySelector("[data-key=probe]")?.remove();
   const box = Object.assign(document.createElement("input"), { type: "text" });
   box.dataset.key = "probe";
-  box.addEventListener("change", event => { globalThis.told = event.target.value; });
-  globalThis.told = null;
+  box.addEventListener("change", event => { globalThis.sent = event.target.value; });
+  globalThis.sent = null;
   document.querySelector("main").append(box);
 }"""
 
@@ -135,9 +135,9 @@ def test_what_is_being_typed_stays_when_a_part_is_drawn_again_and_is_told_when_i
         box.press_sequentially("180")
         page.evaluate(DRAW_BOX)
         page.wait_for_function("document.activeElement.value === '180'")
-        assert page.evaluate("globalThis.told") is None
+        assert page.evaluate("globalThis.sent") is None
         page.keyboard.press("Tab")
-        page.wait_for_function("globalThis.told === '180'")
+        page.wait_for_function("globalThis.sent === '180'")
         box.focus()
         page.evaluate(DRAW_BOX)
         page.wait_for_function("document.activeElement.dataset.key === 'probe'")

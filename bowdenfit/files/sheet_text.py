@@ -113,8 +113,11 @@ def _score_separator(lines: Sequence[Line], separator: str) -> tuple[bool, int, 
 def _count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
     """Return how many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
 
-    Blanks, which separate words too, count for less by every word between them.
+    Blanks, which separate words too, count for less by every word between them, except where words stand once over each
+    column of numbers.
     """
+    if separator == " " and _has_one_word_over_each_column(rows):
+        rows = rows[1:]
     total = 0
     for row in rows:
         filled = [cell for cell in row.cells if cell.strip()]
@@ -122,6 +125,11 @@ def _count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
         wrong = filled if separator == " " else list(filter(_TOGETHER.search, filled))
         total += numbers - sum(not is_measured(cell) for cell in wrong) * (1 if separator == " " else 2)
     return total
+
+
+def _has_one_word_over_each_column(rows: Sequence[CsvRecord]) -> bool:
+    columns = {len(row.cells) for row in rows}
+    return len(columns) == 1 and columns != {1} and all(is_measured(cell) for row in rows[1:] for cell in row.cells)
 
 
 def choose_decimal(rows: Sequence[CsvRecord]) -> str:

@@ -388,6 +388,7 @@ FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 )
 @example(table=[[0.0, 1.7976931348623157e308], [0.0, -9.9792015476736e291]], habit=(",", "."), end="\n")
 @example(table=[[0.0], [-2.0000000000000004e16], [-1.0], [0.0]], habit=(";", ","), end="\n")  # else two columns, one a clock
+@example(table=[[0.0, 1e-05, 0.0]], habit=(" ", ","), end="\n")  # else separated at the commas, with a text between
 def test_any_numbers_written_as_csv_come_back_to_the_last_bit(table, habit, end):
     separator, decimal = habit
     text = io.StringIO()

@@ -26,6 +26,7 @@ from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
+from bowdenfit.questions.check.remedies import PAIRS, describe_remedies
 from bowdenfit.questions.recorded.causes_of_departures import describe_creep, describe_slow_noise
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, shown, significant
@@ -43,6 +44,9 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
     for departure in clear:  # one place may have been tested in two ways, and inside runs as well as between them
         departures.setdefault((departure.table, departure.group or departure.against), departure)
     checks = check_readings(fit)
+    of_forces = [departure for departure in departures.values() if _is_of_forces(departure)]
+    if of_forces and describe_remedies(fit):  # of all of them
+        departures = {key: d for key, d in departures.items() if d is of_forces[0] or d not in of_forces}
     sentences = tuple(_describe_departure(fit, departure) for departure in list(departures.values())[:_MAX_NAMED])
     noise = fit.dataset.description.noise
     return (
@@ -51,6 +55,11 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
         + _describe_far_readings(fit, noise)
         + (_describe_scatter(checks, noise) if checks else ())
     )
+
+
+def _is_of_forces(departure: Departure) -> bool:
+    """Return whether losses between pairs of forces depart by what a zero, a gain, drag or the load changes."""
+    return departure.table == PAIRS and departure.against in (WRAP_ANGLE, ORDER, LOAD, STROKE) and not departure.group
 
 
 def _describe_delay(fit: Record) -> tuple[str, ...]:
@@ -167,6 +176,8 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
+    if _is_of_forces(departure) and (remedies := describe_remedies(fit)):
+        return remedies
     noise = describe_slow_noise(fit, departure) if departure.against == LOAD and losses else ""
     if departure.against in (LOAD, STROKE) and losses and not noise and (creep := describe_creep(fit, departure)):
         return creep

@@ -128,9 +128,9 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             origin_of_rows(table),
             read_unused_columns(table, columns),
         )
+        _refuse_single_fractions(column, rows)
         if "run" in columns:
             _refuse_shared_runs(columns["run"].cells, rows)
-        _refuse_single_fractions(column, rows)
         remarks = (*_remark_fractions(column, rows), *remark_on_errors_in_cells(table, columns))
         return TableFromFiles(rows, {path.name: path}, remarks, (table.account,))
 

@@ -29,6 +29,14 @@ def test_a_fraction_among_percentages_is_refused_by_its_row(on_body, tmp_path, r
     assert "a fraction among percentages" in str(caught.value)
 
 
+def test_fractions_are_named_before_runs_of_several_rows(tmp_path):
+    rows = [f"{run},{90 * run},{100 * eta if run < 4 else eta}" for run, eta in enumerate((0.8, 0.7, 0.6, 0.5), 1)]
+    path = tmp_path / "mixed.csv"
+    path.write_text("\n".join(["run,wrap_angle_deg,efficiency_percent", *rows, *rows]) + "\n")
+    with pytest.raises(bf.DatasetError, match="write 50"):
+        bf.fit(path)
+
+
 @pytest.mark.parametrize(
     ("readings", "message"),
     [

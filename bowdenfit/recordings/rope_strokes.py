@@ -16,6 +16,7 @@ from bowdenfit.recordings.preparation.hysteresis import (
     Deviations,
     Hysteresis,
     clear_of_turns,
+    noise_about_curves,
     play,
     robust_minimum,
     smooth_input,
@@ -210,7 +211,7 @@ class RopeStrokes:
         """Return where both forces are clear of their noise, so that their logarithms say something; not chosen by noise."""
         forces = (blocks.input_force, blocks.output_force)
         return ~blocks.saturated & np.all(
-            [smooth_input(force) > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0
+            [smooth_input(force) > _CLEAR_OF_NOISE * noise_about_curves(force) for force in forces], axis=0
         )
 
     def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:

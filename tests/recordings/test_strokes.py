@@ -19,6 +19,7 @@ from bowdenfit.questions.simulate.bench import (
 )
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, RawRecording, Strokes
+from bowdenfit.recordings.rope_strokes import RopeStrokes
 from bowdenfit.recordings.strokes import correlation_time, find_strokes
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -222,6 +223,17 @@ def test_time_without_load_is_neither_used_nor_in_the_way():
 def test_drag_is_not_found_where_there_is_none_to_tell_it_by():
     strokes = find(noise=0.5, exponent=0.02).strokes
     assert strokes.drag < 20.0  # noise in logarithms shrinks with drag, and must not be mistaken for a better fit
+
+
+def test_a_fast_motion_is_not_taken_for_noise():
+    """Forces that turn every few blocks are clear of their noise where they are low."""
+    generator, time = np.random.default_rng(3), np.arange(3000) / 10
+    waves = [np.sin(2 * np.pi * f * time + generator.uniform(0, 2 * np.pi)) for f in generator.uniform(0.1, 3.0, 40)]
+    motion = sum(waves)
+    force = 5 + 95 * (motion - motion.min()) / np.ptp(motion)
+    forces = [factor * force + generator.normal(0, 0.3, len(time)) for factor in (1.0, 0.6)]
+    blocks = Blocks(time, *forces, np.full(len(time), np.nan), np.ones(len(time), int), np.zeros(len(time), bool))
+    assert np.mean(RopeStrokes().usable(blocks)) > 0.98
 
 
 def test_a_loop_off_center_and_a_lone_pull_are_remarked_on():

@@ -181,7 +181,7 @@ def smooth_input(force: Vector) -> Vector:
     Args:
         force: Force of the blocks of a recording [N].
     """
-    noise = _noise(force)
+    noise = noise_about_curves(force)
     smooth = _smooth(force, noise)
     heading = last_contact(play(smooth, _TURNS * noise)[1])
     heading[heading == 0] = heading[np.argmax(heading != 0)]
@@ -199,7 +199,7 @@ def smooth_input(force: Vector) -> Vector:
     return likely
 
 
-def _noise(force: Vector) -> float:
+def noise_about_curves(force: Vector) -> float:
     """Return the standard deviation of the white part of a series; a curve adds less than to second differences alone."""
     fourth = np.diff(force, 4)
     by_fourth = float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70)) if len(fourth) else np.inf

@@ -60,7 +60,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     width, center = max((high - low) / 2, _LEAST_EXPONENT), (high + low) / 2
     level = float(np.median(few_out))
     noise_in, noise_out = (max(white_noise(force), 1e-6 * level) for force in (few_in, few_out))
-    noise = float(np.median(np.hypot(noise_in / few_in, noise_out / few_out)))
+    noise = float(np.median(np.hypot(white_noise(force_in) / few_in, white_noise(force_out) / few_out)))  # of neighbors
     around_other_ratio = [width, center, 0.0]
     if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0

@@ -18,6 +18,7 @@ from bowdenfit.questions.simulate.bench import (
     simulate_recording,
 )
 from bowdenfit.recordings.preparation import prepare
+from bowdenfit.recordings.preparation.hysteresis import play
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, RawRecording, Strokes
 from bowdenfit.recordings.rope_strokes import RopeStrokes
 from bowdenfit.recordings.strokes import correlation_time, find_strokes
@@ -225,15 +226,24 @@ def test_drag_is_not_found_where_there_is_none_to_tell_it_by():
     assert strokes.drag < 20.0  # noise in logarithms shrinks with drag, and must not be mistaken for a better fit
 
 
-def test_a_fast_motion_is_not_taken_for_noise():
-    """Forces that turn every few blocks are clear of their noise where they are low."""
-    generator, time = np.random.default_rng(3), np.arange(3000) / 10
-    waves = [np.sin(2 * np.pi * f * time + generator.uniform(0, 2 * np.pi)) for f in generator.uniform(0.1, 3.0, 40)]
-    motion = sum(waves)
-    force = 5 + 95 * (motion - motion.min()) / np.ptp(motion)
-    forces = [factor * force + generator.normal(0, 0.3, len(time)) for factor in (1.0, 0.6)]
-    blocks = Blocks(time, *forces, np.full(len(time), np.nan), np.ones(len(time), int), np.zeros(len(time), bool))
-    assert np.mean(RopeStrokes().usable(blocks)) > 0.98
+def turning_every_few_blocks(seed: int, lowest: float, exponent: float, top: float) -> Blocks:
+    """Blocks of forces with frequencies up to `top` times a tenth of their rate."""
+    generator, time = np.random.default_rng(seed), np.arange(3000) / 10
+    waves = [np.sin(2 * np.pi * f * time + generator.uniform(0, 2 * np.pi)) for f in generator.uniform(0.1, top, 40)]
+    motion = np.sum(waves, axis=0)
+    force_in = lowest + (100 - lowest) * (motion - motion.min()) / np.ptp(motion)
+    forces = force_in, np.exp(play(np.log(force_in), exponent)[0])
+    noisy = [force + generator.normal(0, 0.3, len(time)) for force in forces]
+    return Blocks(time, *noisy, np.full(len(time), np.nan), np.ones(len(time), int), np.zeros(len(time), bool))
+
+
+def test_low_forces_of_a_fast_motion_are_not_taken_for_noise():
+    assert np.mean(RopeStrokes().usable(turning_every_few_blocks(3, 5.0, 0.1, 3.0))) > 0.98
+
+
+def test_a_loop_of_which_few_blocks_are_fitted_is_not_taken_for_one_phase():
+    strokes = find_strokes(turning_every_few_blocks(1, 10.0, 0.6, 2.5), "run.csv", "run")
+    assert strokes.exponent == pytest.approx(0.6, rel=0.03)
 
 
 def test_a_loop_off_center_and_a_lone_pull_are_remarked_on():

@@ -26,7 +26,7 @@ from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
-from bowdenfit.questions.check.remedies import PAIRS, describe_remedies
+from bowdenfit.questions.check.remedies import describe_remedies
 from bowdenfit.questions.recorded.causes_of_departures import describe_creep, describe_slow_noise
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, shown, significant
@@ -44,9 +44,12 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
     for departure in clear:  # one place may have been tested in two ways, and inside runs as well as between them
         departures.setdefault((departure.table, departure.group or departure.against), departure)
     checks = check_readings(fit)
-    of_forces = [departure for departure in departures.values() if _is_of_forces(departure)]
-    if of_forces and describe_remedies(fit):  # of all of them
-        departures = {key: d for key, d in departures.items() if d is of_forces[0] or d not in of_forces}
+    of_losses = [departure for departure in departures.values() if _is_of_losses(departure)]
+    explained = next((departure for departure in of_losses if _describe_recorded_cause(fit, departure)), None)
+    if explained is None and of_losses and describe_remedies(fit):
+        explained = of_losses[0]
+    if explained is not None:  # by what makes losses depart in the other ways too
+        departures = {key: d for key, d in departures.items() if d is explained or d not in of_losses}
     sentences = tuple(_describe_departure(fit, departure) for departure in list(departures.values())[:_MAX_NAMED])
     noise = fit.dataset.description.noise
     return (
@@ -57,9 +60,10 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
     )
 
 
-def _is_of_forces(departure: Departure) -> bool:
-    """Return whether losses between pairs of forces depart by what a zero, a gain, drag or the load changes."""
-    return departure.table == PAIRS and departure.against in (WRAP_ANGLE, ORDER, LOAD, STROKE) and not departure.group
+def _is_of_losses(departure: Departure) -> bool:
+    """Return whether losses of force depart by what a zero, a gain, drag, the load or the speed changes."""
+    is_loss = find_readings(departure.table).are_efficiencies and not departure.group
+    return is_loss and departure.against in (WRAP_ANGLE, ORDER, LOAD, STROKE, SPEED)
 
 
 def _describe_delay(fit: Record) -> tuple[str, ...]:
@@ -176,14 +180,13 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
-    if _is_of_forces(departure) and (remedies := describe_remedies(fit)):
+    if cause := _describe_recorded_cause(fit, departure):
+        return cause
+    if _is_of_losses(departure) and (remedies := describe_remedies(fit)):
         return remedies
-    noise = describe_slow_noise(fit, departure) if departure.against == LOAD and losses else ""
-    if departure.against in (LOAD, STROKE) and losses and not noise and (creep := describe_creep(fit, departure)):
-        return creep
     if departure.against == LOAD and losses:
         zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
-        return noise + _suggest_friction(model, ("drag", "load-dependent"), zero)
+        return _suggest_friction(model, ("drag", "load-dependent"), zero)
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:
@@ -209,6 +212,12 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
             "take loads and bends in random order, and leave out the readings from before it settled."
         )
     return "Look at those readings first; if they are right, this model is not that of the cable there."
+
+
+def _describe_recorded_cause(fit: Record, departure: Departure) -> str:
+    """Describe noise or creep in recordings that changes losses with the load, or with the stroke; empty without."""
+    noise = describe_slow_noise(fit, departure) if departure.against == LOAD else ""
+    return noise or (describe_creep(fit, departure) if departure.against in (LOAD, STROKE) else "")
 
 
 def _suggest_column(fit: Record, departure: Departure) -> str:

@@ -37,7 +37,7 @@ def describe_slow_noise(fit: Record, departure: Departure) -> str:
                     f"The likeliest cause is noise: that of {name} in {recording.name} is {significant(sd, 2)} N and stays "
                     f"alike for {significant(time, 2)} s, so that averaging takes little of it, and {percent} % of the lowest "
                     "loads, where the rope seems to slide with each of its peaks. Record with less noise (shielding, another "
-                    "amplifier) or larger loads. "
+                    "amplifier) or larger loads."
                 )
     return ""
 

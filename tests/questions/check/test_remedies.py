@@ -1,4 +1,6 @@
-"""Where pairs of forces depart from the model, the verdict names the settings with which they do not."""
+"""Where losses of force depart from the model, the verdict names the settings with which they do not."""
+
+from itertools import product
 
 import numpy as np
 import pytest
@@ -7,23 +9,26 @@ import bowdenfit as bf
 
 ANGLES, LOADS, MOUNTINGS = (45, 90, 135, 180, 270, 360), (20.0, 40.0, 60.0), 2
 ZEROS, GAINS, DRAG, LOAD = "zeros of the load cells", "gains of the load cells", "hidden tension", "falls with the load"
+SPEED, SPEEDS = "changes with the speed", (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # mm/s
 
 
 def write_bench(path, fault, scale=1.0):
     """Write pairs of forces of a cable of mu = 0.12, read with one fault at a time; forces in newtons times `scale`."""
-    generator, rows, run = np.random.default_rng(7), ["run,wrap_angle_deg,stroke,input_force_N,output_force_N"], 0
+    generator, run = np.random.default_rng(7), 0
+    rows = ["run,wrap_angle_deg,stroke,velocity_mm/s,input_force_N,output_force_N"]
     for angle in np.repeat(ANGLES, MOUNTINGS):
         run, scatter = run + 1, generator.normal(0, 0.01)
         bend = np.deg2rad(angle + (30 if fault == "bend" else 0))
-        for load in LOADS:
+        for load, speed in product(LOADS, SPEEDS if fault == "speed" else (10.0,)):
+            mu = 0.12 * (1 + 0.5 * np.exp(-speed / 5) if fault == "speed" else 1.0)
             hidden, true_in = 15.0 if fault == "drag" else 0.0, load * generator.normal(1, 0.01)
             if fault == "load":  # dF/dangle = -0.12 F (F / 60 N)^-0.4, integrated
                 true_out = (true_in**0.4 - 0.4 * 0.12 * LOADS[-1] ** 0.4 * bend) ** 2.5 * np.exp(-scatter)
             else:
-                true_out = (true_in + hidden) * np.exp(-0.12 * bend - scatter) - hidden
+                true_out = (true_in + hidden) * np.exp(-mu * bend - scatter) - hidden
             read_in, read_out = np.array([true_in, true_out]) + generator.normal(0, 0.15, 2)
             read_out = read_out * (1.08 if fault == "gain" else 1.0) + (4.0 if fault == "zero" else 0.0)
-            rows.append(f"{run},{angle},pull,{scale * read_in:.7g},{scale * read_out:.7g}")
+            rows.append(f"{run},{angle},pull,{speed},{scale * read_in:.7g},{scale * read_out:.7g}")
     path.write_text("\n".join(rows) + "\n")
     return path
 
@@ -38,13 +43,13 @@ def test_an_output_that_was_not_tared_is_named_and_told_from_others(tmp_path):
     trusted, text = describe(write_bench(tmp_path / "bench.csv", "zero"))
     assert not trusted
     assert ZEROS in text
-    assert not any(words in text for words in (GAINS, DRAG, LOAD, "Something drifted"))
+    assert not any(words in text for words in (GAINS, DRAG, LOAD, SPEED, "Something drifted"))
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("scale", [0.02, 100])
 @pytest.mark.parametrize(
-    ("fault", "words"), [("zero", ZEROS), ("gain", GAINS), ("bend", GAINS), ("drag", DRAG), ("load", LOAD)]
+    ("fault", "words"), [("zero", ZEROS), ("gain", GAINS), ("bend", GAINS), ("drag", DRAG), ("load", LOAD), ("speed", SPEED)]
 )
 def test_the_fault_is_among_those_that_are_named(tmp_path, fault, words, scale):
     trusted, text = describe(write_bench(tmp_path / "bench.csv", fault, scale))

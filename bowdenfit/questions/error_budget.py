@@ -19,6 +19,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.bench_errors import CONTRADICTION, LearnedErrors, learn_errors
+from bowdenfit.inference.degrees_of_freedom import fit_t_distribution
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.bench_error import STEP, ErrorSource
@@ -60,6 +61,8 @@ class BudgetRow:
         readings: Its interval by the readings alone.
         bench: The interval with the errors of the bench.
         shifts: By how much each source moves it, one standard deviation, by name.
+        degrees_of_freedom: Effective degrees of freedom, by Welch and Satterthwaite (GUM, G.4.1): those of a t distribution for
+            the readings, and infinitely many for limits.
     """
 
     quantity: str
@@ -67,6 +70,7 @@ class BudgetRow:
     readings: Interval
     bench: Interval
     shifts: Mapping[str, float]
+    degrees_of_freedom: float
 
     JSON: ClassVar = (..., "coverage_factor")
 
@@ -225,7 +229,10 @@ def error_budget(fit: Record) -> ErrorBudget | None:
             source.name: float(np.std(deviations[:, learned.source == number] @ slopes[learned.source == number]))
             for number, source in enumerate(learned.sources)
         }
-        rows.append(BudgetRow(name, unit, Interval.of(draws), Interval.of(moved), shifts))
+        scale, degrees = fit_t_distribution(draws)
+        variance = scale**2 + sum(shift**2 for shift in shifts.values())
+        effective = degrees * (variance / scale**2) ** 2 if scale > 0 else np.inf
+        rows.append(BudgetRow(name, unit, Interval.of(draws), Interval.of(moved), shifts, float(effective)))
     return ErrorBudget(learned.sources, tuple(rows), _list_learned(learned))
 
 
@@ -251,7 +258,7 @@ def list_answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
     return quantities
 
 
-HEADS = ("quantity", "readings alone", "with errors", "k", "angles", "gain", "hysteresis", "wear", "load")
+HEADS = ("quantity", "readings alone", "with errors", "k", "dof", "angles", "gain", "hysteresis", "wear", "load")
 _SOURCES = ("wrap angles", "gain", "hysteresis", "wear", "load exponent")
 
 
@@ -263,7 +270,7 @@ def budget_rows(budget: ErrorBudget) -> list[tuple[str, ...]]:
         name = row.quantity if row.unit in ("", "1") else f"{row.quantity} ({row.unit})"
         shifts = [f"{row.shifts[source]:.1g}" if source in row.shifts else "-" for source in _SOURCES]
         intervals = row.readings.range_text(digits), row.bench.range_text(digits)
-        rows.append((name, *intervals, f"{row.coverage_factor:.2f}", *shifts))
+        rows.append((name, *intervals, f"{row.coverage_factor:.2f}", f"{row.degrees_of_freedom:.0f}", *shifts))
     return rows
 
 
@@ -273,7 +280,8 @@ def budget_text(fit: Record) -> str:
     if budget is None:
         return ""
     note = (
-        "k is the coverage factor; the last five columns are the shifts by one standard uncertainty of each error, as far as "
+        "k is the coverage factor, dof the effective degrees of freedom by Welch and Satterthwaite, inf where tails are those "
+        "of a normal distribution; the last five columns are the shifts by one standard uncertainty of each error, as far as "
         "readings leave it open. Propagated by Monte Carlo (JCGM 101)."
     )
     lines = [TITLE, table(HEADS, budget_rows(budget)), *(filled(sentence) for sentence in (*budget.sentences(), note))]

@@ -7,6 +7,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.description.defaults import BenchErrors
+from bowdenfit.inference.degrees_of_freedom import fit_t_distribution
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.rows import OwnAngles
@@ -59,6 +60,7 @@ def test_uncertainties_add_as_in_the_gum(fit):
     added = np.sqrt(sum(shift**2 for shift in row.shifts.values()))
     assert row.bench.sd == pytest.approx(np.hypot(row.readings.sd, added), rel=0.1)
     assert row.coverage_factor == pytest.approx(1.6, abs=0.15)
+    assert row.degrees_of_freedom > fit_t_distribution(fit.draws().values["mu"].ravel())[1]  # limits have infinitely many
     assert row.bench.q05 < row.readings.q05 < row.readings.median < row.readings.q95 < row.bench.q95
 
 

@@ -19,13 +19,12 @@ from bowdenfit.addons.certificate.laboratory import CellCertificate, LaboratoryF
 from bowdenfit.addons.certificate.uncertainty import (
     UncertaintyComponent,
     combined_standard_uncertainty,
-    coverage_factor,
     effective_degrees_of_freedom,
-    fit_t_distribution,
     symmetric_interval,
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import BowdenfitError, UsageError, suggest_name
+from bowdenfit.inference.degrees_of_freedom import coverage_factor, fit_t_distribution
 from bowdenfit.questions.error_budget import error_budget, list_answers, with_bench_errors
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record

@@ -10,10 +10,9 @@ from bowdenfit.addons.certificate.answer import CertifiedQuantity
 from bowdenfit.addons.certificate.uncertainty import (
     UncertaintyComponent,
     combined_standard_uncertainty,
-    coverage_factor,
     effective_degrees_of_freedom,
-    fit_t_distribution,
 )
+from bowdenfit.inference.degrees_of_freedom import coverage_factor, fit_t_distribution
 
 # JCGM 100:2008, table H.1 [nm]: the standard, the difference, and the differences of expansion and of temperature.
 END_GAUGE = (

@@ -39,7 +39,7 @@ def masked(text: str) -> str:
     # Whether a bell's part has a width, and what its departure means, varies with quick draws too.
     text = re.sub(r"(_angle_[ABC]) .*", r"\1 ...", text)
     text = re.sub(r"root\s+mean\s+square;.*?\.", "root mean square; ...", text, flags=re.S)
-    text = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", text)
+    text = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?|\binf\b(?=  )", "#", text)
     return re.sub(r"-{3,}", "---", re.sub(r"[ ]{2,}", "  ", text)).strip() + "\n"
 
 

@@ -140,7 +140,7 @@ class Judge:
             start = find_maximum_posterior(density, self.objective)
             squares = fit_least_squares(density, self.objective, start.z)
         reasons = () if squares.converged else (squares.message,)
-        return Fit(data, squares, None, not reasons, reasons, provenance(1, Stopwatch(announces=False)))
+        return Fit(data, squares, None, not reasons, reasons, provenance(1, Stopwatch(announces=False), {}))
 
 
 def shape_of(data: Dataset) -> str:

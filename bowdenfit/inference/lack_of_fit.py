@@ -32,7 +32,7 @@ from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, e
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.kinds.plausibility import MOST_LEVELS
 from bowdenfit.kinds.runs import RunsData
-from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
+from bowdenfit.kinds.sliding_rows import OFFSET, ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import Model
 
@@ -63,7 +63,7 @@ class Departure:
         p_value: Bonferroni-adjusted p-value: that of this departure times the number of departures that were tested.
         size: Root mean square of the departure, relative to that of the readings [1].
         low, high: Mean position of the lowest third and of the highest third of the readings; for a drifting zero, its value at
-            the start and at the end of a run, relative to its middle [N].
+            the start and at the end of a run, relative to its middle [N]; for an offset 0, and that of the output [N].
         at_low, at_high: By how much readings there exceed the model, relative to the readings [1].
         moved: For a drifting zero, whose size says little: the largest shift of a friction coefficient, over half of its 90 %
             interval; 0 where the drift is not significant. None for all others.
@@ -119,23 +119,24 @@ def find_departures(
     reweighed = _correct_bench_errors(basin, _reweigh_by_scatter(basin, model, scale))
     system = group_residuals(model, reweighed)
     candidates = [departure for readings in system.readings for departure in _test_departures(system, readings)]
+    if model.description.fits_offsets:  # of which nothing is left but what the linear approximation lacks
+        candidates = [departure for departure in candidates if departure.against != OFFSET]
     candidates += _test_curves(basin.problem.posterior, reweighed, system)
     corrected = (replace(departure, p_value=min(departure.p_value * len(candidates), 1.0)) for departure in candidates)
-    assessed = (
-        _assess_drift(basin, reach, system, departure) if departure.against == ZERO else departure
-        for departure in corrected
-    )
+    assessed = (_assess_zero(basin, reach, system, d) if d.against in (ZERO, OFFSET) else d for d in corrected)
     ordered = tuple(sorted(assessed, key=lambda departure: (departure.p_value, -departure.size)))
     return ordered, _find_far_readings(system)
 
 
-def _assess_drift(basin: Basin, reach: Mapping[str, float], system: ResidualGroups, departure: Departure) -> Departure:
-    """Estimate a drifting zero, and how far it moves coefficients, by a refit with the drift subtracted from the readings."""
+def _assess_zero(basin: Basin, reach: Mapping[str, float], system: ResidualGroups, departure: Departure) -> Departure:
+    """Estimate an offset, or a drifting zero and how far it moves coefficients, by a refit without it in the readings."""
     readings = next(r for r in system.readings if r.table == departure.table and r.inside)
-    x, whole = readings.at[ZERO], np.zeros(len(system.residuals))
+    x, whole = readings.at[departure.against], np.zeros(len(system.residuals))
     whole[readings.rows] = x / (readings.unit * readings.scatter)
     remaining = whole - system.followed @ (system.followed.T @ whole)
     drift = float(remaining @ system.residuals / (remaining @ remaining))
+    if departure.against == OFFSET:
+        return replace(departure, low=0.0, high=drift)
     ends = _compare_thirds(readings, readings.at[ORDER], np.ones(len(x), dtype=bool))[2:]
     drifting = replace(departure, low=-drift, high=drift, at_low=ends[0], at_high=ends[1], moved=0.0)
     if departure.p_value >= FALSE_ALARM:
@@ -225,7 +226,7 @@ def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterato
             if not (selected.any() and np.all(np.isfinite(x[selected])) and np.ptp(x[selected]) > 0):
                 continue
             for columns in _departure_columns(against, x, selected, bool(group), against in readings.unused):
-                lever = np.ones(len(x)) if against == ZERO else readings.lever
+                lever = np.ones(len(x)) if against in (ZERO, OFFSET) else readings.lever
                 by_speed = _speed_columns(readings, selected) if against == ORDER else np.zeros((len(x), 0))
                 columns = np.hstack([columns, by_speed])
                 scaled = np.where(selected[:, None], columns, 0.0) * lever[:, None]
@@ -318,7 +319,7 @@ def _departure_columns(
             yield (x[:, None] == levels[None, :]).astype(float)
     elif against == SPEED:
         yield np.log(np.maximum(np.where(selected, x, 1.0), np.max(x[selected]) / 1e3))[:, None]
-    elif against in (STROKE, ZERO):
+    elif against in (STROKE, ZERO, OFFSET):
         yield x[:, None].astype(float)
     elif against == GROUP:
         yield (x[:, None] == levels[None, :]).astype(float)

@@ -32,7 +32,7 @@ _LEAST_FREEDOM = 4  # degrees of freedom from which distances estimate the noise
 _YORK_STEPS = 20  # of a fixed-point iteration that gains a digit or more in each; a judgement
 _MEDIAN = 0.6745  # median size of a standard normal deviate
 ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one load; a judgement
-STROKE, SPEED, ORDER, ZERO = "Stroke", "Speed", "Order", "Zero"
+STROKE, SPEED, ORDER, ZERO, OFFSET = "Stroke", "Speed", "Order", "Zero", "Offset"
 _MOST = 4000  # readings that are tested one by one; neighbors of more are joined, to bound the time. A judgement
 
 
@@ -262,8 +262,8 @@ def list_readings_inside_runs(cell: Labels, run: Labels, rows: SlidingRows, nois
 def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     """Return load, stroke, speed, order inside the run, wrap angle and unused columns of every reading.
 
-    With a clock also what a zero of the output that drifts by a newton from the middle of the run to its end adds to the log
-    ratio.
+    Where both strokes were read, also what an offset of the output of a newton adds to the log ratio; and with a clock what a
+    zero of the output does that drifts by a newton from the middle of the run to its end.
     """
     first, last = np.full(int(run.max()) + 1, len(run)), np.zeros(int(run.max()) + 1, dtype=int)
     np.minimum.at(first, run, np.arange(len(run)))
@@ -271,8 +271,10 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     own_angles = np.where(rows.angles.is_own, rows.angles.own, 0.0)
     order = (np.arange(len(run)) - first[run]).astype(float)
     later = 2 * order / np.maximum(last - first, 1)[run] - 1
-    drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}
-    return {heading: column.numbers for heading, column in rows.unused.items()} | drifting | {
+    offset = -rows.stroke / rows.output_force
+    zeros = {OFFSET: offset} if np.ptp(rows.stroke) > 0 else {}
+    zeros |= {ZERO: offset * later} if np.any(rows.drift) else {}
+    return {heading: column.numbers for heading, column in rows.unused.items()} | zeros | {
         LOAD: _loads(2 * run + (rows.stroke > 0), rows),
         STROKE: rows.stroke.astype(float),
         SPEED: np.abs(rows.velocity),

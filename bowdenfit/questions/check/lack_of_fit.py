@@ -20,7 +20,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
+from bowdenfit.kinds.sliding_rows import OFFSET, ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.models import build_model
@@ -63,7 +63,7 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
 def _is_of_losses(departure: Departure) -> bool:
     """Return whether losses of force depart by what a zero, a gain, drag, the load or the speed changes."""
     is_loss = find_readings(departure.table).are_efficiencies and not departure.group
-    return is_loss and departure.against in (WRAP_ANGLE, ORDER, LOAD, STROKE, SPEED)
+    return is_loss and departure.against in (WRAP_ANGLE, ORDER, LOAD, STROKE, SPEED, OFFSET)
 
 
 def _describe_delay(fit: Record) -> tuple[str, ...]:
@@ -113,6 +113,12 @@ def _describe_departure(fit: Record, departure: Departure) -> str:
     readings = find_readings(departure.table)
     what = _readable_column(departure.group) if departure.group else readings.words
     read = "the loss" if readings.are_efficiencies else "what was read"
+    if departure.against == OFFSET:
+        return (
+            f"The model does not describe {what}: pulling and returning differ by what an output adds whose zero is off by "
+            f"about {significant(departure.high, 2)} N (or an input, the other way); chance alone does this in "
+            f"{_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
+        )
     low, high = (_percent_excess(excess) for excess in (departure.at_low, departure.at_high))
     where = _where_low_and_high(departure, _levels(fit, departure))
     return (
@@ -187,6 +193,8 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     if departure.against == LOAD and losses:
         zero = "the zero of the load cells (tare them with the rope slack, or have their offsets fitted)"
         return _suggest_friction(model, ("drag", "load-dependent"), zero)
+    if departure.against == OFFSET:
+        return "Tare the load cells with the rope slack, or state how far their zeros may be off (offset_sd under [sensors])."
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:
@@ -217,7 +225,7 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
 def _describe_recorded_cause(fit: Record, departure: Departure) -> str:
     """Describe noise or creep in recordings that changes losses with the load, or with the stroke; empty without."""
     noise = describe_slow_noise(fit, departure) if departure.against == LOAD else ""
-    return noise or (describe_creep(fit, departure) if departure.against in (LOAD, STROKE) else "")
+    return noise or (describe_creep(fit, departure) if departure.against in (LOAD, STROKE, OFFSET) else "")
 
 
 def _suggest_column(fit: Record, departure: Departure) -> str:

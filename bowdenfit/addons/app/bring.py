@@ -9,6 +9,7 @@ from nicegui import ui
 
 from bowdenfit.addons.app.curve_menu import is_of_curves, show_curve_menu
 from bowdenfit.addons.app.data_charts import sketch_file
+from bowdenfit.addons.app.description_edit import Part
 from bowdenfit.addons.app.draft import Draft, Refusal, Understanding
 from bowdenfit.addons.app.elements import (
     BENCH,
@@ -25,7 +26,7 @@ from bowdenfit.addons.app.elements import (
 )
 from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import attempt, frame, notify, refused, section
-from bowdenfit.addons.app.measured_view import MeasuredView, show_checked, sort_warnings
+from bowdenfit.addons.app.measured_view import MeasuredView, Warnings, show_checked, sort_warnings
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.sheet import FILE as TYPED
 from bowdenfit.addons.app.sheet import TypedSheet
@@ -115,22 +116,27 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     _show_steps(understanding)
     with section("What was read", "read"):
         _show_refusals(understanding.refusals)
+        place = block("div")  # of what is refused, next to the reason
         _show_files(draft, understanding, look_again)
     _show_questions(workbench, draft, understanding, look_again)
-    if not understanding.description:
-        return
-    warnings = sort_warnings(understanding.checked) if understanding.checked is not None else {}
-    with section("What it means", "understood"):
-        if understanding.checked is not None:
-            show_checked(understanding.checked, warnings)
-        place = block("div")
-        with block("details"):
-            text("The cable.toml that is written", "summary")
-            text(understanding.description, "pre", "toml", tabindex="0")
+    warnings: Warnings = {}
     if understanding.checked is not None:
+        warnings = sort_warnings(understanding.checked)
+        with section("What it means", "understood"):
+            show_checked(understanding.checked, warnings)
+            place = block("div")
+            with block("details"):
+                text("The cable.toml that is written", "summary")
+                text(understanding.description, "pre", "toml", tabindex="0")
         _show_writing(workbench, draft)
-    with place:
-        await MeasuredView(workbench, draft.folder).show(understanding.refusals, warnings)
+
+    async def change_part(kind: str, file: str, part: Part, reason: str | None) -> None:
+        await workbench.compute(draft.change_part, kind, file, part, reason)
+        await look_again()
+
+    if understanding.description:
+        with place:
+            await MeasuredView(workbench, draft.folder, change_part).show(understanding.refusals, warnings)
 
 
 def _show_steps(understanding: Understanding) -> None:
@@ -306,5 +312,7 @@ def _show_writing(workbench: Workbench, draft: Draft) -> None:
         with block("div", "row"):
             button("Write the data set", lambda: attempt(write), "primary")
         if not draft.is_described:
-            command = EquivalentCommand([""], "In the folder of the files; it asks the same questions:", key="init-command")
+            then = "; what is left out goes into cable.toml, as above" if draft.excluded else ""
+            where = f"In the folder of the files; it asks the same questions{then}:"
+            command = EquivalentCommand([""], where, key="init-command")
             show_init()

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bowdenfit.addons.app.brought_folder import lay_flat, put_in_place
+from bowdenfit.addons.app.description_edit import Part, exclude_part, include_part, read_description_text
 from bowdenfit.addons.app.form import Form, FormEntry, UnansweredError
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
@@ -60,7 +61,7 @@ class Understanding:
         files: Its files.
         entries: The questions.
         refusals: Why it cannot be fitted yet.
-        description: Text of its cable.toml; empty where questions are open.
+        description: Text of its cable.toml; empty where questions are open, or it cannot be read.
         report: Report of `check`; empty where it cannot be fitted.
         checked: The same as it was checked; None where it cannot be fitted.
         left_out: Files that the data set will not have, because their contents are not what their extension says.
@@ -84,6 +85,8 @@ class Draft:
         answers: Answers of the user, by question.
         stated: What was stated of columns, as (quantity, unit), by file and heading.
         typed: Cells that are typed, the headings first; empty where nobody types.
+        excluded: What is left out, as (kind of table, file, part), with the reason; of a cable.toml that was brought, that
+            says it itself.
         understanding: What was understood when it was last looked at.
         is_described: Whether a cable.toml was brought with the files.
         cable: What that calls the cable.
@@ -94,6 +97,7 @@ class Draft:
     answers: dict[str, str] = field(default_factory=dict)
     stated: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
     typed: list[list[str]] = field(default_factory=list)
+    excluded: dict[tuple[str, str, Part], str] = field(default_factory=dict)
     understanding: Understanding = Understanding()
     is_described: bool = False
     cable: str = ""
@@ -117,8 +121,12 @@ class Draft:
         name = re.sub(r"[^\w.()+-]+", "-", name).strip("-._")[:_LONGEST_NAME] or "my-cable"
         return f"{name}-cable" if is_module_name(name) else name
 
-    def new_file(self, name: str) -> Path:
-        """Return where a file of a name is to be written.
+    def new_file(self, name: str, rows: int = 0) -> Path:
+        """Return where a file of a name is to be written; what was left out of it before is used again.
+
+        Args:
+            name: The name.
+            rows: Rows at its top that stay as they are, so that those of them that are left out stay so.
 
         Raises:
             UsageError: The name is not one of a file that may lie in a data set, or there are too many.
@@ -132,7 +140,14 @@ class Draft:
             raise UsageError(f"{shown(name)} is left out, because its extension is not one of measured files: {extensions}.")
         if len(self.files) >= _MOST_FILES:
             raise UsageError(f"{shown(name)} is one file more than the {_MOST_FILES} that are taken; leave some out first.")
+        self._forget_excluded(name, rows)
         return self.folder / name
+
+    def _forget_excluded(self, name: str, rows: int = 0) -> None:
+        kept = self.excluded.items()
+        self.excluded = {
+            key: reason for key, reason in kept if key[1] != name or (isinstance(key[2], int) and key[2] <= rows)
+        }
 
     def remove_file(self, name: str) -> None:
         """Remove one of the files; without a cable.toml of its own it is understood by its files again."""
@@ -142,6 +157,24 @@ class Draft:
         for path in [path for path in self.files if path.name == name]:
             path.unlink()
         self.stated.pop(name, None)
+        self._forget_excluded(name)
+
+    def change_part(self, kind: str, file: str, part: Part, reason: str | None) -> None:
+        """Leave a part of a table out with a reason, or take it in again without one.
+
+        Args:
+            kind, file, part, reason: See `exclude_part`.
+
+        Raises:
+            UsageError, DescriptionError, StoreError: cable.toml cannot be changed so.
+        """
+        if reason is None:
+            include_part(self.folder, kind, file, part)
+            self.excluded.pop((kind, file, part), None)
+            return
+        exclude_part(self.folder, kind, file, part, reason)
+        if not self.is_described:
+            self.excluded[kind, file, part] = reason
 
     def state(self, file: str, heading: str, quantity: str | None = None, unit: str | None = None) -> None:
         """State what a column holds, or its unit; the other stays as it is.
@@ -169,6 +202,10 @@ class Draft:
             if measured_files:
                 description = describe_measured_files(measured_files, _cable_name(measured_files), form)
                 write_text(self.folder / DESCRIPTION_FILE, description)
+                for (kind, name, part), reason in self.excluded.items():
+                    with suppress(UsageError):  # no such table any more, as answers are now
+                        exclude_part(self.folder, kind, name, part, reason)
+                description = read_description_text(self.folder)
                 checked = check_data_set(self.folder, {})
         except UnansweredError:
             pass
@@ -186,9 +223,9 @@ class Draft:
         try:
             refuse_files(self.files)
             self.cable = put_in_place(self.folder).name
+            description = read_description_text(self.folder)
             left_out = tuple(path.name for path in self.files if not _is_measured(path))
             checked = check_data_set(self.folder, {})
-            description = (self.folder / DESCRIPTION_FILE).read_text(encoding="utf-8-sig")
         except BowdenfitError as error:
             refusals = add_cells(list_refusals(error), self.files)
         report = str(checked) if checked is not None else ""
@@ -212,7 +249,7 @@ class Draft:
         """
         if self.is_arriving:
             raise UsageError("files are still on their way; write the data set when they are listed above.")
-        if not self.understanding.description:
+        if self.understanding.checked is None:
             raise UsageError("it cannot be read yet, or questions are still open; see above, and answer them first.")
         refuse_existing(folder)
         if self.is_described:

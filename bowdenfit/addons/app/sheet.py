@@ -172,7 +172,7 @@ class TypedSheet:
         """Write what is typed as a file of the draft, and look at it."""
         typed = to_csv(self._draft.typed)
         if typed:
-            self._draft.new_file(FILE).write_text(typed, encoding="utf-8")
+            self._draft.new_file(FILE, typed.count("\n")).write_text(typed, encoding="utf-8")
         else:
             self._draft.remove_file(FILE)
         await self._look_again()

@@ -1,7 +1,9 @@
 """Data are seen before a fit: a click on a point shows its row, which is left out with a reason, and taken in again."""
 
+import tomllib
+
 import pytest
-from app_in_browser import faults_of, served, visiting
+from app_in_browser import faults_of, serious_findings, served, visiting
 from half_turn_bench import describe_half_turn
 from recorded_benches import RecordedBench, write
 
@@ -116,6 +118,34 @@ def test_files_are_drawn_while_they_are_added_and_refused_rows_are_red(chromium,
         refused.wait_for()
         assert refused.get_attribute("data-row-key") == "7 b.csv" and "'slip' is not a number" in refused.inner_text()
         assert faults_of(page) == []
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_a_negative_wrap_angle_is_left_out_while_files_are_added(chromium, axe, tmp_path, width, scheme):
+    rows = ROWS.replace("run", "run,wrap_angle_deg").replace(",1\n", ",1,90\n").replace(",2\n", ",2,180\n")
+    with served(tmp_path) as app, visiting(chromium, app, width=width, color_scheme=scheme) as visit:
+        page = visit.page
+        page.get_by_role("button", name="New data set").click()
+        spoiled = rows.replace("40,30.9,2,180", "40,30.9,2,-180")
+        page.set_input_files("input[type=file]", {"name": "b.csv", "mimeType": "text/csv", "buffer": spoiled.encode()})
+        leave_out = page.get_by_role("button", name="Leave out: row 6 of b.csv")
+        leave_out.wait_for()
+        assert "'-180' is negative" in page.locator("tr.refused").inner_text()
+        assert [*serious_findings(page, axe), *faults_of(page)] == []
+        leave_out.focus()
+        page.keyboard.press("Enter")
+        page.wait_for_function("document.activeElement.id === 'reason'")
+        page.keyboard.type("sensor <b>upside</b> down")
+        page.keyboard.press("Tab")
+        page.keyboard.press("Enter")
+        page.get_by_text("1 reading left out by the user: b.csv, row 6 (sensor <b>upside</b> down).", exact=True).wait_for()
+        page.locator("#figure-data-forces .uplot").wait_for()
+        assert [*serious_findings(page, axe), *faults_of(page)] == []
+        page.get_by_role("button", name="Write the data set").click()
+        page.wait_for_url("**/data/b")
+        settings = tomllib.loads((tmp_path / "b" / "cable.toml").read_text())["tables"]["forces"]
+        assert settings["exclude"] == [{"rows": [6], "reason": "sensor <b>upside</b> down"}]
+        assert len(bf.read(tmp_path / "b").measurements.tables[0].run) == 5
 
 
 DRAW_BOX = """() => {

@@ -106,6 +106,25 @@ def test_a_refusal_names_the_cell_that_it_speaks_of(draft_of):
     assert refusal.sentence.startswith("forces.csv, row 5, column 'F_out (N)': ")
 
 
+def test_what_is_left_out_of_a_draft_stays_so_until_its_file_comes_again(draft_of):
+    draft = draft_of(forces=TABLE.replace("30.9", "-30.9"))
+    draft.understand()
+    assert [refusal.row for refusal in answer(draft, "By which angle", "180 deg").refusals] == [5]
+    draft.change_part("forces", "forces.csv", 5, "upside down")
+    understanding = answer(draft, "What is the cable called?", "knee")
+    assert tomllib.loads(understanding.description)["tables"]["forces"]["exclude"] == [{"rows": [5], "reason": "upside down"}]
+    assert "1 reading left out by the user" in understanding.report
+    draft.new_file("forces.csv", rows=5).write_text(f"{TABLE}20,15.1,4\n")
+    assert draft.understand().description.count("upside down") == 1
+    draft.change_part("forces", "forces.csv", 5, None)
+    assert "exclude" not in draft.understand().description
+    draft.change_part("forces", "forces.csv", 5, "upside down")
+    draft.new_file("forces.csv").write_text(TABLE)
+    assert "exclude" not in draft.understand().description
+    with pytest.raises(UsageError, match="write why row 5 is left out"):
+        draft.change_part("forces", "forces.csv", 5, " ")
+
+
 def test_tables_and_a_workbook_become_one_table_and_other_headings_are_named(tmp_path):
     """Headings as a German bench writes them; the sheet is that of the workbook alone."""
     head = "Lauf;Kraft Motor (N);Kraft Last (N);Richtung;Umschlingungswinkel (°)"

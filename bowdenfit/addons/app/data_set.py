@@ -115,9 +115,7 @@ class DataSetPage:
         self._seed_place.clear()
         hint = "A whole number; if empty, chosen at random and recorded."
         with self._seed_place, field("Random seed", "seed", hint, fault):
-            line = text_input("seed", self._seed, self._state_seed)
-            line.props["aria-describedby"] = "seed-fault seed-hint" if fault else "seed-hint"
-            line.props["aria-invalid"] = str(bool(fault)).lower()
+            text_input("seed", self._seed, self._state_seed)
 
     def _start(self) -> None:
         """Start the fit.

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
 from typing import Any
@@ -29,7 +30,23 @@ from bowdenfit.kinds.descriptions import parse_description
 
 _VALUE = "event => emit(event.target.value)"
 _PAUSE = 0.6  # s between two checks of a text that is typed; a judgement
+_ADD = "add-"  # begins the keys of fields that add a part
 _PARTS = (("contact", "Contact"), ("friction", "Friction coefficient"), ("prior", "Prior of another parameter"))
+
+
+@dataclass(frozen=True)
+class RefusedEntry:
+    """What is typed into a field and cannot be taken; the description keeps what it has.
+
+    Args:
+        typed: As it is typed.
+        fault: Why it cannot be taken.
+        kept: What the description has in its place.
+    """
+
+    typed: str
+    fault: str
+    kept: str = ""
 
 
 class DescribePage:
@@ -48,6 +65,7 @@ class DescribePage:
         self._text = self._saved = read_description_text(workbench.data_set(name))
         self._open: set[str] = set()
         self._faults: list[str] = []
+        self._refused: dict[str, RefusedEntry] = {}
         title = workbench.title_of(name)
         with frame("Describe the cable", ((title, address("data", name)),)):
             text("Every key that cable.toml may have. What is left empty is left out, and then holds what is said below it.")
@@ -82,6 +100,9 @@ class DescribePage:
             except (tomllib.TOMLDecodeError, RecursionError):
                 text("The form comes back when the text is TOML again.", classes="hint")
                 return
+            values = {entry.key: entry.value for group in groups for entry in group.fields}
+            refused_entries = self._refused.items()  # but those that were changed in the text since
+            self._refused = {key: entry for key, entry in refused_entries if values.get(key, "") == entry.kept}
             for number, group in enumerate(groups):
                 self._show_group(group, number == 0)
             self._show_additions()
@@ -101,8 +122,10 @@ class DescribePage:
 
     def _show_field(self, entry: FormField) -> None:
         """Show one key."""
-        label = f"{entry.label} (needed)" if entry.needed else entry.label
-        with field(label, entry.key, entry.hint, self._find_fault(entry)):
+        label, fault = f"{entry.label} (needed)" if entry.needed else entry.label, self._find_fault(entry)
+        if refusal := self._refused.get(entry.key):
+            entry = replace(entry, value=refusal.typed)
+        with field(label, entry.key, entry.hint, fault):
             options = entry.options if entry.kind == MENU else ("true", "false") if entry.kind == YES_NO else ()
             if options:
                 unknown = () if entry.value in ("", *options) else (entry.value,)
@@ -115,47 +138,56 @@ class DescribePage:
                 text_input(entry.key, entry.value, self._setter(entry))
 
     def _find_fault(self, entry: FormField) -> str:
-        """Return why a key is refused as it is; empty where it is not."""
+        """Return why a key is refused as it is, or as it is typed; empty where it is not."""
+        if refusal := self._refused.get(entry.key):
+            return refusal.fault
         path = re.compile(rf"(?<![\w.]){re.escape('.'.join(map(str, entry.path)))}(?!\w)")
         return next((fault for fault in self._faults if path.search(fault)), "")
 
     def _setter(self, entry: FormField) -> Callable[[str], Any]:
-        async def change(typed: str) -> None:
-            def apply() -> None:
-                self._text = set_field(self._text, entry, typed)
-
-            await attempt(apply)
-            self._draw()
+        def change(typed: str) -> None:
+            self._take(entry.key, typed, lambda: set_field(self._text, entry, typed), entry.value)
 
         return change
 
+    def _take(self, key: str, typed: str, change: Callable[[], str], kept: str = "") -> None:
+        """Take what is typed into a field, or keep it there with why it cannot be taken."""
+        self._refused.pop(key, None)
+        try:
+            self._text = change()
+        except BowdenfitError as error:
+            self._refused[key] = RefusedEntry(typed, str(error), kept)
+        self._draw()
+
     def _show_additions(self) -> None:
         """Show how a contact, a coefficient, a prior or a table is added."""
-        with block("details"):
+        with block("details") as part:
             text("Add a contact, a coefficient, a prior or a table", "summary")
             for topic, words in _PARTS:
                 self._show_addition(topic, words)
-            kind = {"name": ""}
+            key = f"{_ADD}tables"
+            refusal = self._refused.get(key, RefusedEntry("", ""))
+            kind = {"name": refusal.typed}
             with block("div", "row"):
-                with field("Table of", "add-tables"):
+                with field("Table of", key, fault=refusal.fault):
                     options = [("", "choose one"), *((name, name) for name in table_kinds())]
-                    choice("add-tables", "", options, lambda name: kind.update(name=name))
+                    choice(key, refusal.typed, options, lambda name: kind.update(name=name))
                 button("Add the table", lambda: self._add("tables", kind["name"]), key="add-table")
+        if any(key.startswith(_ADD) for key in self._refused):
+            part.props["open"] = True
 
     def _show_addition(self, topic: str, words: str) -> None:
         """Show the field and the button that add one."""
-        name = {"name": ""}
+        key = f"{_ADD}{topic}"
+        refusal = self._refused.get(key, RefusedEntry("", ""))
+        name = {"name": refusal.typed}
         with block("div", "row"):
-            with field(f"{words}: its name", f"add-{topic}"):
-                text_input(f"add-{topic}", "", lambda typed: name.update(name=typed))
-            button(f"Add the {words.split()[0].lower()}", lambda: self._add(topic, name["name"]), key=f"add-{topic}-button")
+            with field(f"{words}: its name", key, fault=refusal.fault):
+                text_input(key, refusal.typed, lambda typed: name.update(name=typed))
+            button(f"Add the {words.split()[0].lower()}", lambda: self._add(topic, name["name"]), key=f"{key}-button")
 
-    async def _add(self, topic: str, name: str) -> None:
-        def apply() -> None:
-            self._text = add_part(self._text, topic, name)
-
-        if await attempt(apply):
-            self._draw()
+    def _add(self, topic: str, name: str) -> None:
+        self._take(f"{_ADD}{topic}", name, lambda: add_part(self._text, topic, name))
 
     def _check_typed(self, event: Any) -> None:
         """Say what is wrong with a text while it is typed."""
@@ -172,14 +204,18 @@ class DescribePage:
         """Show whether the description can be read."""
         self._status.clear()
         with self._status:
-            if faults := find_faults(self._text):
+            if faults := [*find_faults(self._text), *self._list_refused()]:
                 refused("\n".join(faults))
             else:
                 state = "It is as it was saved." if self._text == self._saved else "It can be saved."
                 text(f"Nothing is wrong with this description by itself. {state}", classes="state good")
 
+    def _list_refused(self) -> list[str]:
+        """Return why fields of keys cannot be taken; names of parts that are not added yet are none."""
+        return [entry.fault for key, entry in self._refused.items() if not key.startswith(_ADD)]
+
     def _undo(self) -> None:
-        self._text = self._saved
+        self._text, self._refused = self._saved, {}
         self._draw()
 
     def _save(self) -> None:
@@ -188,6 +224,8 @@ class DescribePage:
         Raises:
             UsageError, DescriptionError, StoreError: It cannot be saved.
         """
+        if self._list_refused():
+            raise UsageError("a field holds what cannot be taken; see there, and correct or clear it. Nothing was saved.")
         folder = self._workbench.data_set(self._name)
         if read_description_text(folder) != self._saved:
             raise UsageError(

@@ -1,6 +1,7 @@
 """What pages are made of: plain elements of HTML with labels, in the look of the report."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -82,8 +83,9 @@ def link(words: str, target: str, classes: str = "", **attributes: str) -> Eleme
     return text(words, "a", classes, href=f"{root}{target}", data_key=target, **attributes)
 
 
-def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
-    """Return a block with a label, into which the control of that key goes; what is below it describes it.
+@contextmanager
+def field(label: str, key: str, hint: str = "", fault: str = "") -> Iterator[None]:
+    """Put a control below its label; what is below it describes it, also to those who do not see it.
 
     Args:
         label: Label of the field.
@@ -91,15 +93,19 @@ def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
         hint: Below it.
         fault: Why what it holds cannot be taken.
     """
-    outer = block("div", "field")
-    with outer:
+    with block("div", "field"):
         text(label, "label", for_=key)
-        slot = block("div")
+        with block("div") as slot:
+            yield
         if fault:
             text(page_words(fault), "p", "fault", id=f"{key}-fault", role="alert")
         if hint:
             text(page_words(hint), "p", "hint", id=f"{key}-hint")
-    return slot
+    described = [f"{key}-{part}" for part, words in (("fault", fault), ("hint", hint)) if words]
+    for control in slot.descendants():
+        if described and control.props.get("id") == key:
+            control.props["aria-describedby"] = " ".join(described)
+            control.props["aria-invalid"] = str(bool(fault)).lower()
 
 
 def text_input(key: str, value: str, on_change: Callable[[str], Any], placeholder: str = "", label: str = "") -> Element:

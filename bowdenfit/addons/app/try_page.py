@@ -94,7 +94,7 @@ class TryPage:
         key, self._z[slider.name] = f"try-{slider.name}", slider.start
         with field(slider.name, key, slider.meaning), block("div", "dial"):
             knob = block("input", id=key, type="range", data_key=key, min=f"{slider.low:.12g}", max=f"{slider.high:.12g}")
-            knob.props["step"], knob.props["aria-describedby"] = f"{slider.step:.12g}", f"{key}-hint"
+            knob.props["step"] = f"{slider.step:.12g}"
             knob.props[VALUE_AT_FIRST] = f"{slider.start:.12g}"
             self._outputs[slider.name] = text("", "output", for_=key), slider
 

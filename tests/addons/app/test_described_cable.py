@@ -3,14 +3,14 @@
 import tomllib
 
 import pytest
-from app_in_browser import faults_of, served, visiting
+from app_in_browser import faults_of, serious_findings, served, visiting
 from half_turn_bench import TABLE, describe_half_turn
 
 pytestmark = pytest.mark.extended
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])
-def test_form_and_text_say_the_same_and_are_saved(chromium, tmp_path, width, scheme):
+def test_form_and_text_say_the_same_and_are_saved(chromium, axe, tmp_path, width, scheme):
     folder = tmp_path / "bench"
     folder.mkdir()
     (folder / "cable.toml").write_text(f"# </textarea><b>ours</b>\n{describe_half_turn()}")
@@ -24,7 +24,19 @@ def test_form_and_text_say_the_same_and_are_saved(chromium, tmp_path, width, sch
         page.get_by_text("Load cells").click()
         page.get_by_label("force_noise", exact=True).fill("half")
         page.keyboard.press("Tab")
-        page.get_by_text("'half' is not a number with its unit").wait_for()
+        field = page.get_by_label("force_noise", exact=True).and_(page.locator('[aria-invalid="true"]'))
+        field.wait_for()
+        fault, hint = field.get_attribute("aria-describedby").split()
+        assert "'half' is not a number with its unit" in page.locator(f"#{fault}").inner_text()
+        assert page.locator(f"#{hint}").is_visible()
+        assert field.input_value() == "half" and page.input_value("#toml") == (folder / "cable.toml").read_text()
+        assert [*serious_findings(page, axe), *faults_of(page)] == []
+        page.get_by_role("button", name="Save cable.toml").click()
+        page.get_by_text("a field holds what cannot be taken").wait_for()
+        page.get_by_label("offset_sd", exact=True).fill("1 N")
+        page.keyboard.press("Tab")
+        page.wait_for_function("document.querySelector('#toml').value.includes('offset_sd')")
+        assert field.input_value() == "half"
         page.get_by_label("force_noise", exact=True).fill("0.5 N")
         page.keyboard.press("Tab")
         page.get_by_text("It can be saved.").wait_for()

@@ -100,8 +100,8 @@ class FileColumn:
 
     @property
     def dimension(self) -> str:
-        """What its unit measures; empty without one."""
-        return dimension_of(self.unit) if self.unit else ""
+        """What its unit measures, with a minus for the other sign or without; empty without one."""
+        return dimension_of(self.unit.removeprefix("-")) if self.unit else ""
 
     @property
     def words(self) -> str:

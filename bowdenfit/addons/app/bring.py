@@ -28,6 +28,7 @@ from bowdenfit.addons.app.equivalent_command import EquivalentCommand
 from bowdenfit.addons.app.frame import attempt, frame, notify, refused, section
 from bowdenfit.addons.app.measured_view import MeasuredView, Warnings, show_checked, sort_warnings
 from bowdenfit.addons.app.page_words import page_words
+from bowdenfit.addons.app.refused_recordings import sketch_refused
 from bowdenfit.addons.app.sheet import FILE as TYPED
 from bowdenfit.addons.app.sheet import TypedSheet
 from bowdenfit.addons.app.workbench import Workbench, refuse_folder_name, refuse_module_name
@@ -35,7 +36,7 @@ from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
 from bowdenfit.kinds.lone_file import FileColumn
 from bowdenfit.pages.page import render_section
-from bowdenfit.pages.section import prose_section
+from bowdenfit.pages.section import Picture, prose_section
 from bowdenfit.questions.start.measured_file import MeasuredFile
 from bowdenfit.units import usual_units
 from bowdenfit.words import counted, listed, shown
@@ -65,6 +66,7 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
             with place:
                 text("Reading the files ...", role="status")
         understanding = Understanding() if draft.is_arriving else await workbench.compute(draft.understand)
+        sketches = await workbench.compute(_sketch_refused, draft, understanding)
         if look != newest["look"]:  # something was answered since, and is looked at next
             return
         place.clear()
@@ -72,7 +74,7 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
             if draft.is_arriving:
                 text("Files are on their way.")
                 return
-            await _show_understanding(workbench, draft, understanding, look_again)
+            await _show_understanding(workbench, draft, understanding, sketches, look_again)
         sheet.mark(understanding.refusals)
 
     draft.is_arriving = False  # a page that was closed while it sent files never says that they all arrived
@@ -108,7 +110,16 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
     zone.on("drop", taken, js_handler=f"async event => emit(await sendFiles(event.dataTransfer.files, '{target}'))")
 
 
-async def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
+def _sketch_refused(draft: Draft, understanding: Understanding) -> tuple[Picture, ...]:
+    """Return charts of recordings that are refused before there is a cable.toml, with which `MeasuredView` draws them."""
+    tables = {file.path for file in understanding.files if file.kind and not file.kind.takes_channels}
+    paths = [path for path in draft.files if path not in tables]
+    return () if understanding.description else sketch_refused(paths, understanding.refusals)
+
+
+async def _show_understanding(
+    workbench: Workbench, draft: Draft, understanding: Understanding, sketches: tuple[Picture, ...], look_again: Again
+) -> None:
     """Show what is understood of a draft in steps: what was read, what is asked, and what it means."""
     if not (draft.files or draft.is_described):
         text("Nothing is here yet.")
@@ -117,6 +128,8 @@ async def _show_understanding(workbench: Workbench, draft: Draft, understanding:
     with section("What was read", "read"):
         _show_refusals(understanding.refusals)
         place = block("div")  # of what is refused, next to the reason
+        if sketches:
+            markup(render_section(prose_section("", (), pictures=sketches), {}), "div")
         _show_files(draft, understanding, look_again)
     _show_questions(workbench, draft, understanding, look_again)
     warnings: Warnings = {}
@@ -220,7 +233,10 @@ def _show_column(draft: Draft, file: MeasuredFile, column: FileColumn, number: i
 
     meanings = [("", "not used"), *((name, f"{name}: {words}" if words else name) for name, words in file.meanings.items())]
     usual = [unit for name in (column.dimension, *_DIMENSIONS) if name for unit in usual_units(name)]
-    units = [("", "not stated"), *((unit, unit) for unit in dict.fromkeys([column.unit, *usual]) if unit)]
+    plain = column.unit.removeprefix("-")
+    units = [("", "not stated"), *((unit, unit) for unit in dict.fromkeys([plain, *usual]) if unit)]
+    if file.kind and file.kind.takes_channels and plain:
+        units.append((f"-{plain}", f"-{plain}: the other sign"))
     key, meaning = f"{file.name}-{number}", file.meaning_of(column)
     ends = (f"{column.low:.5g}", f"{column.high:.5g}") if column.numbers else ("", "")
     with block("tr"):

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from bowdenfit.addons.app.draft import Refusal
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
@@ -16,7 +17,9 @@ from bowdenfit.kinds.recordings.reader import RecordingsTable
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.recordings.recording import Recordings
 
-READ, LEFT_OUT, REFUSED = "read", "left out", "refused"
+READ: Final = "read"
+LEFT_OUT: Final = "left out"
+REFUSED: Final = "refused"
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,12 @@ from bowdenfit.addons.app.measured_rows import LEFT_OUT, READ, FileRow, FileRows
 from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.points import parse_sample_key, row_key
 from bowdenfit.addons.app.recorded_parts import KIND, ChangePart, RecordedParts
+from bowdenfit.addons.app.refused_recordings import sketch_refused
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.pages.page import render_section
-from bowdenfit.pages.section import prose_section
+from bowdenfit.pages.section import Picture, prose_section
 from bowdenfit.words import counted, printable
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class MeasuredView:
     def __init__(self, workbench: Workbench, folder: Path, change: ChangePart | None = None) -> None:
         self._workbench, self._folder, self._change = workbench, folder, change
         self._measured = MeasuredRows()
+        self._sketches: tuple[Picture, ...] = ()
         self._parts: RecordedParts | None = None
 
     async def show(self, refusals: tuple[Refusal, ...] = (), warnings: Warnings = MappingProxyType({})) -> None:
@@ -64,8 +66,10 @@ class MeasuredView:
         """
         charts, self._rows = block("div", id="charts"), block("div", id="rows")
         self._measured = await self._workbench.compute(collect_rows, self._folder, refusals)
+        recordings = [self._folder / recorded.file for recorded in self._measured.recorded]
+        self._sketches = await self._workbench.compute(sketch_refused, recordings, refusals)
         with charts:
-            place = markup(_render_charts(self._measured, (), self._change is not None), "div")
+            place = markup(self._render_charts(()), "div")
             place.on("pick", self._pick, js_handler="event => emit(event.detail)")
         with self._rows:
             files, recorded = self._measured.files, [KIND] if self._measured.recorded else []
@@ -83,7 +87,12 @@ class MeasuredView:
                 curves = await self._workbench.compute(fit_curves, dataset)
             except BowdenfitError:
                 return
-            place.set_content(_render_charts(self._measured, curves, self._change is not None))
+            place.set_content(self._render_charts(curves))
+
+    def _render_charts(self, curves: Any) -> str:
+        """Return the charts as HTML."""
+        pictures = make_pictures(self._measured, curves, self._change is not None)
+        return render_section(prose_section("", (), pictures=(*self._sketches, *pictures)), {})
 
     def _pick(self, event: Any) -> None:
         """Take a click on a recording; of any other point the page shows the row itself."""
@@ -197,11 +206,6 @@ def show_checked(report: "Report", warnings: Warnings) -> None:
     with block("details"):
         text("Everything that was read", "summary")
         report_text(str(report))
-
-
-def _render_charts(measured: MeasuredRows, curves: Any, can_change: bool) -> str:
-    """Return the charts as HTML."""
-    return render_section(prose_section("", (), pictures=make_pictures(measured, curves, can_change)), {})
 
 
 def _render_rows(file: FileRows, can_change: bool) -> str:

@@ -148,6 +148,31 @@ def test_a_negative_wrap_angle_is_left_out_while_files_are_added(chromium, axe, 
         assert len(bf.read(tmp_path / "b").measurements.tables[0].run) == 5
 
 
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_a_recording_that_is_refused_is_drawn_while_files_are_added(chromium, axe, tmp_path, width, scheme):
+    path = write(RecordedBench(rate=100.0, length=60.0), tmp_path / "bench", seed=4) / "r0.csv"
+    head, *lines = path.read_text().splitlines()
+    inverted = [",-".join(line.rsplit(",", 1)) for line in lines]
+    with served(tmp_path) as app, visiting(chromium, app, width=width, color_scheme=scheme) as visit:
+        page = visit.page
+        page.get_by_role("button", name="New data set").click()
+        for name, rows in (("slip.csv", [*lines[:999], "9.99,50,slip", *lines[1000:]]), ("sign.csv", inverted)):
+            content = "\n".join([head, *rows, ""]).encode()
+            page.set_input_files("input[type=file]", {"name": name, "mimeType": "text/csv", "buffer": content})
+            if name == "sign.csv":
+                page.get_by_label("By which angle").fill("180 deg")
+                page.keyboard.press("Tab")
+                page.get_by_text("are negative, down to").wait_for()
+            chart = page.get_by_role("figure").filter(has_text=name)
+            chart.locator(".uplot").wait_for()
+            assert chart.get_by_text("row 1001", exact=True).count() == (name == "slip.csv")
+            assert [*serious_findings(page, axe), *faults_of(page)] == []
+            if name == "slip.csv":
+                page.get_by_role("button", name="Leave slip.csv out").click()
+        page.get_by_label("Unit of output_force_N").select_option("-N")
+        page.get_by_text("Everything could be read").first.wait_for()
+
+
 DRAW_BOX = """() => {
   document.querySelector("[data-key=probe]")?.remove();
   const box = Object.assign(document.createElement("input"), { type: "text" });

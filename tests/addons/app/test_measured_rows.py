@@ -16,6 +16,7 @@ from bowdenfit.addons.app.description_edit import exclude_part, include_part, wr
 from bowdenfit.addons.app.draft import list_refusals
 from bowdenfit.addons.app.measured_rows import LEFT_OUT, READ, REFUSED, collect_rows
 from bowdenfit.addons.app.points import parse_sample_key, row_key
+from bowdenfit.addons.app.refused_recordings import sketch_refused
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.recordings.recording import Recordings
@@ -190,6 +191,32 @@ def test_stretches_and_whole_recordings_are_left_out_by_the_clock_of_the_recordi
     for file, part in (("r1.csv", (520.0, 526.5)), ("r0.csv", None), ("r1.csv", (540.0, 541.0))):
         include_part(folder, "recordings", file, part)
     assert (folder / "cable.toml").read_text() == text
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_a_recording_that_is_refused_is_drawn_with_the_place_of_the_fault(tmp_path, separator):
+    folder = write(RecordedBench(rate=100.0, length=60.0), tmp_path / "bench", seed=4)
+    lines = (folder / "r0.csv").read_text().splitlines()
+
+    def sketch(rows):
+        text = "\n".join([lines[0], *rows, ""])
+        (folder / "r0.csv").write_text(text if separator == "," else text.replace(",", ";").replace(".", ","))
+        with pytest.raises(BowdenfitError) as refusal:
+            bf.check(folder)
+        (picture,) = sketch_refused([folder / "r0.csv"], list_refusals(refusal.value))
+        (chart,) = picture.charts
+        assert [group.series[0].label for group in chart.groups] == ["input_force_N", "output_force_N"]
+        return chart, [(span.label, span.start) for span in chart.spans]
+
+    words = [*lines[1:3000], f"{lines[3000].rsplit(',', 1)[0]},slip", *lines[3001:]]
+    chart, places = sketch(words)
+    assert places == [("row 3001", 29.99)] and (chart.x_label, chart.y_label) == ("time_s", "As written (N)")
+    expected = np.loadtxt(lines[1:], delimiter=",")
+    assert chart.groups[0].series[0].values.max() == pytest.approx(expected[:, 1].max())
+    chart, places = sketch([*lines[3001:], *lines[1:3001]])  # the second half first
+    assert places == [("the time falls back", 3001)] and chart.x_label == "Sample"
+    chart, places = sketch([f"{line.rsplit(',', 1)[0]},5" for line in lines[1:]])
+    assert places == [] and np.ptp(chart.groups[1].series[0].values) == 0
 
 
 def test_a_reason_is_needed(bench):

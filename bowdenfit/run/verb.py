@@ -77,7 +77,7 @@ def fit(
     folder = Path(output) if output is not None else None
     with show_progress_bar(WATCH, progress) as show:
         data = run.choose_sampler(read(dataset, **reading), sampler, mcmc)
-        announce_stage("loading JAX")
+        announce_stage("starting the fit")
         with reserve_folder(folder):
             seed = run.choose_seed(folder, data, mcmc, seed, resume, force)
             keep_compiled_programs()

@@ -240,7 +240,7 @@ def read_dataset(
         settings = description.tables.stated.get(kind.name)
         if settings is None:
             continue
-        with faults.collect():
+        with faults.collect(key_path=("tables", kind.name)):
             read = kind.read(Source(kind.name, settings, description, folder, channels or {}))
             measurements = _add_table(measurements, read, kind.name, description)
             accounts += read.accounts
@@ -254,7 +254,7 @@ def read_dataset(
         )
     with faults.collect():
         check_names(description)
-    with faults.collect():
+    with faults.collect(key_path=("friction_model",)):
         order_groups(description, measurements)
     for kind, table in iterate_tables(measurements):
         with faults.collect():

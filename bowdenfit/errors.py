@@ -23,14 +23,22 @@ class BowdenfitError(Exception):
     """Base of all errors a user can cause or meet; its text is complete sentences with a remedy.
 
     `faults` are the errors that one error combines. Faults of a table with the same `fault_key` are reported once, with their
-    rows. `key_path` holds the keys that lead to the faulty entry of a description.
+    rows. `key_path` holds the keys that lead to the faulty entry of a description, or to it from what is being read.
     """
 
     exit_code = 1
     faults: "tuple[BowdenfitError, ...]" = ()
     fault_key: Hashable = None
     row: int = 0
-    key_path: tuple[str | int, ...] = ()
+
+    def __init__(self, sentence: str = "", key_path: tuple[str | int, ...] = ()) -> None:
+        super().__init__(sentence)
+        self.key_path = key_path
+
+    def put_below(self, *keys: str | int) -> None:
+        """Put the keys below which something was read before those that this error, or the errors in it, have."""
+        for fault in self.faults or (self,):
+            fault.key_path = (*keys, *fault.key_path) if fault.key_path else ()
 
     def __str__(self) -> str:
         """The text with control characters written out: names of files in it may hold any."""

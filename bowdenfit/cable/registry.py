@@ -47,12 +47,13 @@ def check_names(description: Description) -> None:
     Raises:
         DescriptionError: One is unknown, or lacks it.
     """
-    for contact in description.contact:
+    for number, contact in enumerate(description.contact):
         named = (("law", contact.law, list(CONTACT_LAWS)), ("curve", contact.wrap_angle.curve, list(CURVES)))
         for what, name, known in named:
             if name is not None and name not in known:
                 raise DescriptionError(
-                    f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{suggest_name(name, known)}"
+                    f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{suggest_name(name, known)}",
+                    key_path=("contact", number, *(("wrap_angle",) if what == "curve" else ()), what),
                 )
         _check_length(description, contact)
 

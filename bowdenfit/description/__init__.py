@@ -239,7 +239,13 @@ class Description(Display, Frozen):
     @property
     def angle_columns(self) -> tuple[str, ...]:
         """Columns in which rows may carry their own wrap angle."""
-        return tuple(dict.fromkeys(c.wrap_angle.column for c in self.contact if c.wrap_angle.column))
+        return tuple(self.angle_column_keys)
+
+    @property
+    def angle_column_keys(self) -> dict[str, tuple[str | int, ...]]:
+        """Keys that lead to the name of each of these columns, in the last contact that has it."""
+        columns = [contact.wrap_angle.column for contact in self.contact]
+        return {column: ("contact", i, "wrap_angle", "column") for i, column in enumerate(columns) if column}
 
     def sentences(self) -> list[str]:
         """Return what the cable is."""

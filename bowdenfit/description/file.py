@@ -142,7 +142,9 @@ def check_quantities(quantities: Iterable[Stated], file: str) -> None:
     """
     faults = Faults()
     for where, quantity, dimension in quantities:
-        with faults.collect(key_path=(where.partition(",")[0].split()[0],)):
+        topic, *keys = where.split(", ")
+        key, *names = topic.split()  # of a contact or recording its name is known here, not its number
+        with faults.collect(key_path=(key,) if names else (key, *keys)):
             if quantity is not None:
                 _check_quantity(f"{file}, {where}", where, quantity, dimension)
     faults.refuse()

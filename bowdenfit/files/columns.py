@@ -126,7 +126,7 @@ def find_columns(
         columns = can_be[quantity.name]
         if quantity.name in sources or columns:
             by_quantity[quantity.name] = _missing_column(table, quantity.name)
-        with table.faults.collect():
+        with table.faults.collect(("columns", quantity.name) if quantity.name in sources else ()):
             if len(columns) > 1:
                 raise _ambiguous_column_error(table, quantity.name, columns)
             if quantity.name in sources and quantity.name not in wrong:
@@ -247,13 +247,16 @@ def read_unused_columns(table: RawTable, columns: Mapping[str, Column]) -> dict[
     return unused
 
 
-def require_column(table: RawTable, columns: Mapping[str, Column], name: str, example: str) -> Column:
-    """Return the column called `name`; that there is none is noted among the table's faults."""
+def require_column(
+    table: RawTable, columns: Mapping[str, Column], name: str, example: str, key_path: tuple[str | int, ...] = ()
+) -> Column:
+    """Return the column called `name`; that there is none is noted among the table's faults, with the key that names it."""
     if name in columns:
         return columns[name]
     read = {column.heading for column in columns.values()}
     is_second = name == "output_force" and "input_force" not in columns
-    table.faults.faults.append(_missing_column_error(table, name, example, read, is_second))
+    with table.faults.collect(key_path):
+        raise _missing_column_error(table, name, example, read, is_second)
     return _missing_column(table, name)
 
 
@@ -349,6 +352,7 @@ def _note_wrong_sources(table: RawTable, known: list[str], sources: Mapping[str,
             _check_source(table, known, name, source, serves)
             serves[source.name] = name
         except DatasetError as error:
+            error.key_path = ("columns", name)
             table.faults.faults.append(error)
             wrong |= {name, *difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE)}
     return wrong

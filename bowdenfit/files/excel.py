@@ -193,7 +193,7 @@ def iterate_sheets(openpyxl: Any, path: Path, only: str = "") -> Iterator[tuple[
         try:
             titles = [sheet.title for sheet in workbook.worksheets]
             if only and only not in titles:
-                raise DatasetError(f"{path.name} has no sheet {shown(only)}{suggest_name(only, titles)}")
+                raise DatasetError(f"{path.name} has no sheet {shown(only)}{suggest_name(only, titles)}", key_path=("sheet",))
             for sheet in workbook.worksheets:
                 if only and sheet.title != only:
                     continue

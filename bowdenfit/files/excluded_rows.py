@@ -32,10 +32,13 @@ def leave_out_rows(
         raise DatasetError(
             f"{table.file}: exclude names row {few([str(row) for row in unknown])}, where no reading is to be left out; the "
             f"usual cause is that rows were added or deleted above since. Readings are in the rows {min(rows)} to {max(rows)}: "
-            "name the right ones, or delete the entry."
+            "name the right ones, or delete the entry.",
+            key_path=("exclude",),
         )
     if len(reasons) == len(rows):
-        raise DatasetError(f"{table.file}: exclude names every row of readings; leave some in, or leave the table out.")
+        raise DatasetError(
+            f"{table.file}: exclude names every row of readings; leave some in, or leave the table out.", key_path=("exclude",)
+        )
     retained = [row not in reasons for row in rows]
 
     def keep(cells: Sequence[Cell]) -> tuple[Cell, ...]:

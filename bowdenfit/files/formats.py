@@ -135,7 +135,8 @@ def refuse_sheet(path: Path, sheet: str) -> None:
         DatasetError: There is a title.
     """
     if sheet:
-        raise DatasetError(f"{path.name} is not a workbook and has no sheet {shown(sheet)}; leave the sheet out.")
+        sentence = f"{path.name} is not a workbook and has no sheet {shown(sheet)}; leave the sheet out."
+        raise DatasetError(sentence, key_path=("sheet",))
 
 
 def _read_uncached(path: Path, sheet: str) -> ChannelFile:

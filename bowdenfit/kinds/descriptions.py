@@ -262,6 +262,7 @@ def order_groups(description: Description, measurements: Measurements) -> tuple[
         )
     if description.group is not None and description.group not in names:
         raise DescriptionError(
-            f"cable.toml, group: there is no group {description.group!r}{suggest_name(description.group, names)}"
+            f"cable.toml, group: there is no group {description.group!r}{suggest_name(description.group, names)}",
+            key_path=("group",),
         )
     return tuple(sorted(names, key=lambda name: name != description.group))

@@ -298,7 +298,8 @@ def _check_contact(description: Description, angles: AngleTable | None, contact:
         if len(missing) == len(own_angles):
             raise DatasetError(
                 f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
-                f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
+                f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml.",
+                key_path=description.angle_column_keys.get(column, ()),
             )
         reason = (
             f"the cell is blank, but the contact {contact.name!r} has no curve that could stand in for it; fill in the "

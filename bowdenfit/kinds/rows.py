@@ -163,7 +163,8 @@ def read_route(table: RawTable, columns: Mapping[str, Column], route: Route | No
     """Return the route variable of every row; NaN without a route."""
     if route is None:
         return np.full(len(table.rows), np.nan)
-    return round_lengths(require_column(table, columns, route.variable, f"{route.variable}_{route.unit}").numbers())
+    example = f"{route.variable}_{route.unit}"
+    return round_lengths(require_column(table, columns, route.variable, example, ("route", "variable")).numbers())
 
 
 def round_lengths(values: Iterable[float]) -> Vector:

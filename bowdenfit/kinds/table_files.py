@@ -2,14 +2,15 @@
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from bowdenfit.description import MOST_FILES, Description
-from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
+from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError, suggest_name
 from bowdenfit.files.columns import Column, Quantity, find_columns
 from bowdenfit.files.excluded_rows import leave_out_rows
 from bowdenfit.files.formats import WORKBOOKS
@@ -58,7 +59,8 @@ class Source:
             matches = match_files(self.folder, name) if is_pattern else [self.folder / name]
             if not matches:
                 raise DatasetError(
-                    f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."
+                    f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}.",
+                    key_path=("tables", self.kind, "file" if name == stated[0] else "files"),
                 )
             paths += matches
             if len(paths) > MOST_FILES:
@@ -117,11 +119,25 @@ class Source:
             if more:
                 raise DatasetError(f"the table {self.kind} must be on one sheet; cable.toml names {len(more) + 1}.")
         codes = MissingCodes(self.settings.missing)
-        table = codes.mark(read_table(path, sheet=sheet))
-        table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)
-        excluded = {row: f"{BY_USER}{part.reason}" for part in self.find_excluded(path) for row in part.rows}
-        table, columns = leave_out_rows(table, columns, excluded)
-        return leave_out_coded_rows(table, columns, wanted, codes)
+        with self.name_keys(path):
+            table = codes.mark(read_table(path, sheet=sheet))
+            table, columns = fill_merged_cells(table, find_columns(table, wanted, self.columns, unused), wanted)
+            for fault in table.faults.faults:
+                fault.put_below("tables", self.kind)
+            excluded = {row: f"{BY_USER}{part.reason}" for part in self.find_excluded(path) for row in part.rows}
+            table, columns = leave_out_rows(table, columns, excluded)
+            return leave_out_coded_rows(table, columns, wanted, codes)
+
+    @contextmanager
+    def name_keys(self, path: Path | None = None) -> Iterator[None]:
+        """Name the key under [tables] that an error is about; in reading a file that does not exist, the key that names it."""
+        try:
+            yield
+        except BowdenfitError as error:
+            if path is not None and not path.exists():
+                error.key_path = ("file" if getattr(self.settings, "file", None) else "files",)
+            error.put_below("tables", self.kind)
+            raise
 
     def find_excluded(self, path: Path, files: Sequence[Path] = ()) -> list[Any]:
         """Return the entries of `exclude` that leave out parts of a file.
@@ -139,12 +155,14 @@ class Source:
                 example = json.dumps(min(names))
                 raise DescriptionError(
                     f"cable.toml, tables.{self.kind}, exclude: the table has {len(names)} files; say of which one this is, "
-                    f'such as {{ file = {example}, ..., reason = "{part.reason}" }}.'
+                    f'such as {{ file = {example}, ..., reason = "{part.reason}" }}.',
+                    key_path=("exclude",),
                 )
             if part.file is not None and part.file not in names:
                 raise DescriptionError(
                     f"cable.toml, tables.{self.kind}, exclude: the table has no file {shown(part.file)}"
-                    f"{suggest_name(part.file, sorted(names))}"
+                    f"{suggest_name(part.file, sorted(names))}",
+                    key_path=("exclude",),
                 )
             if part.file in (None, self.name_of(path)):
                 excluded.append(part)

@@ -90,7 +90,7 @@ def _says(channel: Channel, quantity: Quantity) -> bool:
 
 
 def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
-    wanted = " ".join(name.split())
+    wanted, key_path = " ".join(name.split()), ("where",) if quantity == "where" else ("channels", quantity)
     matches = [c for c in file.channels if c.name == wanted] or [
         c for c in file.channels if wanted == c.name.rsplit("/", 1)[-1]
     ]
@@ -99,11 +99,13 @@ def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
     if matches:
         raise DatasetError(
             f"{file.path.name} has several channels called {shown(wanted)}: {quoted(tuple(c.name for c in matches))}; give "
-            "the whole name."
+            "the whole name.",
+            key_path=key_path,
         )
     raise DatasetError(
         f"{file.path.name} has no channel {shown(wanted)}, which you name as {quantity}"
-        f"{suggest_name(wanted, [c.name for c in file.channels])}"
+        f"{suggest_name(wanted, [c.name for c in file.channels])}",
+        key_path=key_path,
     )
 
 
@@ -116,14 +118,15 @@ def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: Colu
     read = [*named, channel.unit] if quantity.endswith("torque") else [channel.unit, *named]
     counts = isinstance(source, ChannelSource) and source.gain != 1  # whose unit is that of the gain
     if source and not counts and (reason := contradiction(source.unit, next(filter(None, read), None))):
-        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {reason}.")
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {reason}.", ("channels", quantity))
     stated = next((unit for unit in (source.unit if source else None, *read) if unit), "")
     if not stated:
         units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}
         example = units.get(quantity, "N")
         raise DatasetError(
             f"{file.path.name}: the channel {shown(channel.name)} does not state its unit; give it, such as --channel "
-            f"{quantity}={channel.name}:{example}."
+            f"{quantity}={channel.name}:{example}.",
+            key_path=("channels", quantity),
         )
     text = stated.strip()
     return (-1.0, text[1:]) if text.startswith(("-", "\u2212")) and len(text) > 1 else (1.0, text)
@@ -138,11 +141,12 @@ def converted(
         values = _times(_of_counts(channel, source), sign * conversion_factor(unit, dimension))
     except DatasetError as error:
         gain = f" {_describe_gain(quantity, channel)}" if unit in _SIGNALS else ""
-        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.{gain}") from None
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.{gain}", ("channels", quantity)) from None
     if dimension == "force" and values is channel.values and _are_counts(values):
         raise DatasetError(
             f"{file.path.name}, channel {shown(channel.name)}: whole numbers up to {np.nanmax(np.abs(values)):.0f} are the "
-            f"counts of a converter, such as an HX711, rather than newtons. {_describe_gain(quantity, channel)}"
+            f"counts of a converter, such as an HX711, rather than newtons. {_describe_gain(quantity, channel)}",
+            key_path=("channels", quantity),
         )
     return values
 

@@ -1,11 +1,11 @@
 """The page on which a cable is described: a form for every key of its cable.toml, with the text next to it."""
 
-import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
@@ -24,7 +24,9 @@ from bowdenfit.addons.app.description_form import (
 )
 from bowdenfit.addons.app.elements import address, block, button, choice, field, markup, text, text_input
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.page_words import page_words
 from bowdenfit.addons.app.workbench import Workbench
+from bowdenfit.dataset import read_dataset
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.kinds.descriptions import parse_description
 
@@ -64,7 +66,9 @@ class DescribePage:
         self._workbench, self._name = workbench, name
         self._text = self._saved = read_description_text(workbench.data_set(name))
         self._open: set[str] = set()
-        self._faults: list[str] = []
+        self._faults: tuple[BowdenfitError, ...] = ()
+        self._data_error: BowdenfitError | None = None
+        self._read_text = ""
         self._refused: dict[str, RefusedEntry] = {}
         title = workbench.title_of(name)
         with frame("Describe the cable", ((title, address("data", name)),)):
@@ -75,6 +79,7 @@ class DescribePage:
                 with block("div", "beside"), section("cable.toml", "description-text"):
                     self._editor = block("div")
             self._draw()
+        ui.timer(0.05, self._read_data, once=True)
 
     def _draw(self) -> None:
         """Show form and text."""
@@ -90,10 +95,27 @@ class DescribePage:
                 button("Undo all changes", self._undo)
         self._show_status()
 
+    async def _read_data(self) -> None:
+        """Read the measured files as a description says that is not wrong by itself, and show what is wrong then."""
+        text_read = self._read_text = self._text
+        if find_faults(text_read):
+            return
+        folder = self._workbench.data_set(self._name)
+        error = await self._workbench.compute(find_data_error, text_read, folder)
+        if text_read == self._text == self._read_text:
+            is_same = str(error) == str(self._data_error)
+            self._data_error = error
+            if not is_same:
+                self._draw_form()
+                self._show_status()
+
     def _draw_form(self) -> None:
         """Show the groups of the form; of a text that is no TOML nothing, so that nothing of it is lost."""
         self._form.clear()
         self._faults = find_faults(self._text)
+        data_error = self._data_error
+        if not self._faults and data_error is not None:
+            self._faults = data_error.faults or (data_error,)
         with self._form:
             try:
                 groups = list_groups(tomllib.loads(self._text))
@@ -109,11 +131,15 @@ class DescribePage:
 
     def _show_group(self, group: FormGroup, is_first: bool) -> None:
         """Show one group, open where it was opened."""
+        own_faults = [fault for fault in self._faults if fault.key_path and fault.key_path == group.path]
+        faults = [str(fault) for fault in own_faults if not fault.row]
         with block("details") as part:
             text(group.title if group.is_stated else f"{group.title} (nothing stated)", "summary", dir="auto")
+            for sentence in faults:
+                text(page_words(sentence), "p", "fault")
             for entry in group.fields:
                 self._show_field(entry)
-        if is_first or group.title in self._open or any(self._find_fault(entry) for entry in group.fields):
+        if is_first or group.title in self._open or faults or any(self._find_fault(entry) for entry in group.fields):
             part.props["open"] = True
         part.on("toggle", partial(self._note_open, group.title), js_handler="event => emit(event.target.open)")
 
@@ -141,16 +167,16 @@ class DescribePage:
         """Return why a key is refused as it is, or as it is typed; empty where it is not."""
         if refusal := self._refused.get(entry.key):
             return refusal.fault
-        path = re.compile(rf"(?<![\w.]){re.escape('.'.join(map(str, entry.path)))}(?!\w)")
-        return next((fault for fault in self._faults if path.search(fault)), "")
+        faults = (str(fault) for fault in self._faults if fault.key_path[: len(entry.path)] == entry.path)
+        return next(faults, "")
 
     def _setter(self, entry: FormField) -> Callable[[str], Any]:
-        def change(typed: str) -> None:
-            self._take(entry.key, typed, lambda: set_field(self._text, entry, typed), entry.value)
+        async def change(typed: str) -> None:
+            await self._take(entry.key, typed, lambda: set_field(self._text, entry, typed), entry.value)
 
         return change
 
-    def _take(self, key: str, typed: str, change: Callable[[], str], kept: str = "") -> None:
+    async def _take(self, key: str, typed: str, change: Callable[[], str], kept: str = "") -> None:
         """Take what is typed into a field, or keep it there with why it cannot be taken."""
         self._refused.pop(key, None)
         try:
@@ -158,6 +184,7 @@ class DescribePage:
         except BowdenfitError as error:
             self._refused[key] = RefusedEntry(typed, str(error), kept)
         self._draw()
+        await self._read_data()
 
     def _show_additions(self) -> None:
         """Show how a contact, a coefficient, a prior or a table is added."""
@@ -186,37 +213,41 @@ class DescribePage:
                 text_input(key, refusal.typed, lambda typed: name.update(name=typed))
             button(f"Add the {words.split()[0].lower()}", lambda: self._add(topic, name["name"]), key=f"{key}-button")
 
-    def _add(self, topic: str, name: str) -> None:
-        self._take(f"{_ADD}{topic}", name, lambda: add_part(self._text, topic, name))
+    async def _add(self, topic: str, name: str) -> None:
+        await self._take(f"{_ADD}{topic}", name, lambda: add_part(self._text, topic, name))
 
     def _check_typed(self, event: Any) -> None:
         """Say what is wrong with a text while it is typed."""
         self._text = str(event.args)
         self._show_status()
 
-    def _take_text(self, event: Any) -> None:
+    async def _take_text(self, event: Any) -> None:
         """Take a text that was typed, into the form too."""
         self._text = str(event.args)
         self._draw_form()
         self._show_status()
+        await self._read_data()
 
     def _show_status(self) -> None:
         """Show whether the description can be read."""
         self._status.clear()
         with self._status:
-            if faults := [*find_faults(self._text), *self._list_refused()]:
+            if faults := [*map(str, find_faults(self._text)), *self._list_refused()]:
                 refused("\n".join(faults))
-            else:
-                state = "It is as it was saved." if self._text == self._saved else "It can be saved."
-                text(f"Nothing is wrong with this description by itself. {state}", classes="state good")
+                return
+            state = "It is as it was saved." if self._text == self._saved else "It can be saved."
+            text(f"Nothing is wrong with this description by itself. {state}", classes="state good")
+            if self._data_error is not None and self._read_text == self._text:
+                refused(f"The measured files cannot be read as it says.\n{self._data_error}")
 
     def _list_refused(self) -> list[str]:
         """Return why fields of keys cannot be taken; names of parts that are not added yet are none."""
         return [entry.fault for key, entry in self._refused.items() if not key.startswith(_ADD)]
 
-    def _undo(self) -> None:
+    async def _undo(self) -> None:
         self._text, self._refused = self._saved, {}
         self._draw()
+        await self._read_data()
 
     def _save(self) -> None:
         """Save it, unless it was changed elsewhere meanwhile.
@@ -236,12 +267,26 @@ class DescribePage:
         ui.navigate.to(address("data", self._name))
 
 
-def find_faults(description: str) -> list[str]:
-    """Return why the text of a description is refused by itself, in a sentence for each fault."""
+def find_faults(description: str) -> tuple[BowdenfitError, ...]:
+    """Return why the text of a description is refused by itself."""
     try:
         parse_description(tomllib.loads(description))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        return [f"This is no TOML: {error}. The usual cause is a missing quotation mark or bracket there."]
+        return (UsageError(f"This is no TOML: {error}. The usual cause is a missing quotation mark or bracket there."),)
     except BowdenfitError as error:
-        return [str(fault) for fault in error.faults or (error,)]
-    return []
+        return error.faults or (error,)
+    return ()
+
+
+def find_data_error(description: str, folder: Path) -> BowdenfitError | None:
+    """Return why the measured files of a data set cannot be read as the text of a description says; None where they can.
+
+    Args:
+        description: The text, which is not wrong by itself.
+        folder: The data set.
+    """
+    try:
+        read_dataset(parse_description(tomllib.loads(description)), folder, {})
+    except BowdenfitError as error:
+        return error
+    return None

@@ -69,11 +69,13 @@ class FormGroup:
     """Keys that belong together.
 
     Args:
+        path: Keys and numbers that lead to it; empty for those that are in none.
         title: Heading of the group.
         fields: The keys.
         is_stated: Whether the description says any of them.
     """
 
+    path: Path
     title: str
     fields: tuple[FormField, ...]
     is_stated: bool
@@ -88,7 +90,7 @@ def list_groups(raw: Mapping[str, Any]) -> list[FormGroup]:
     page = _schema()
     properties = {key: schema for key, schema in page["properties"].items() if key not in _WHOLE_TOPICS}
     plain = {key: schema for key, schema in properties.items() if key not in _TITLES}
-    groups = [FormGroup("The cable", tuple(_list_fields({"properties": plain, **_needed(page)}, raw, ())), True)]
+    groups = [FormGroup((), "The cable", tuple(_list_fields({"properties": plain, **_needed(page)}, raw, ())), True)]
     for key in (key for key in _TITLES if key in properties):
         groups += _list_topic(key, properties[key], raw.get(key))
     return groups
@@ -101,22 +103,23 @@ def _list_topic(key: str, schema: Schema, stated: Any) -> Iterator[FormGroup]:
         for number, entry in enumerate(stated if isinstance(stated, list) else ()):
             values = entry if isinstance(entry, Mapping) else {}
             name = values.get("name") or values.get("file") or number + 1
-            yield FormGroup(f"{title} {name}", tuple(_list_fields(_resolve(target["items"]), values, (key, number))), True)
+            path = key, number
+            yield FormGroup(path, f"{title} {name}", tuple(_list_fields(_resolve(target["items"]), values, path)), True)
         return
     values = stated if isinstance(stated, Mapping) else {}
     if "additionalProperties" in target and isinstance(target["additionalProperties"], Mapping):
         for name, entry in values.items():
             of_name = entry if isinstance(entry, Mapping) else {}
             fields = _list_fields(_resolve(target["additionalProperties"]), of_name, (key, name))
-            yield FormGroup(f"{title} {name}", tuple(fields), True)
+            yield FormGroup((key, name), f"{title} {name}", tuple(fields), True)
         return
     if key == "tables":
         for name, entry in values.items():
             if name in target["properties"] and isinstance(entry, Mapping):
                 fields = _list_fields(_resolve(target["properties"][name]), entry, (key, name))
-                yield FormGroup(f"{title} {name}", tuple(fields), True)
+                yield FormGroup((key, name), f"{title} {name}", tuple(fields), True)
         return
-    yield FormGroup(title, tuple(_list_fields(target, values, (key,))), bool(values))
+    yield FormGroup((key,), title, tuple(_list_fields(target, values, (key,))), bool(values))
 
 
 def _list_fields(target: Schema, values: Mapping[str, Any], path: Path, above: str = "") -> Iterator[FormField]:

@@ -64,8 +64,9 @@ class AngleKind(PlannedKind[AngleTable]):
         detection_limit = stated.to("angle") if stated else None
         wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
         table, columns = source.read_table(path, wanted)
-        lengths = require_column(table, columns, route.variable, f"{route.variable}_{route.unit}")
-        angle_columns = [require_column(table, columns, name, f"{name}_deg") for name in contacts]
+        lengths = require_column(table, columns, route.variable, f"{route.variable}_{route.unit}", ("route", "variable"))
+        keys = source.description.angle_column_keys
+        angle_columns = [require_column(table, columns, name, f"{name}_deg", keys[name]) for name in contacts]
         cells = [c.read_cells(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in angle_columns]
         pairs = np.array(cells, dtype=float).reshape(len(angle_columns), len(table.rows), 2)
         route_values, angle, limit = round_lengths(lengths.numbers()), pairs[..., 0].T, pairs[..., 1].T

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
 from bowdenfit.description.measurements import ExcludedSpan
-from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
+from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
 from bowdenfit.files.cells import AS_DECIMALS
 from bowdenfit.files.missing_codes import MissingCodes
@@ -93,7 +93,7 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     entries = _list_entries(source, unused)
     _check_names(entries)
     faults = Faults()
-    read = faults.read_all(lambda entry: _read_file(source, *entry, files_of_all), entries, None)
+    read = faults.read_all(lambda entry: _read_entry(source, *entry, files_of_all), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -126,10 +126,12 @@ def _find_unused(source: Source, files: Sequence[Path]) -> list[Path]:
         DatasetError: They are all files.
         DescriptionError: See `Source.find_excluded`.
     """
-    unused = [path for path in files if any(part.span is None for part in source.find_excluded(path, files))]
+    with source.name_keys():
+        unused = [path for path in files if any(part.span is None for part in source.find_excluded(path, files))]
     if unused and len(unused) == len(files):
         raise DatasetError(
-            "exclude leaves out every recording; leave one in, or delete the recordings under [tables] in cable.toml."
+            "exclude leaves out every recording; leave one in, or delete the recordings under [tables] in cable.toml.",
+            key_path=("tables", "recordings", "exclude"),
         )
     return unused
 
@@ -258,6 +260,21 @@ def _recording_name(path: Path, entry: RecordingFile) -> str:
     return entry.name or entry.run or (f"{path.stem}, {entry.sheet}" if entry.sheet else path.stem)
 
 
+def _read_entry(source: Source, path: Path, entry: RecordingFile, files_of_all: Sequence[Path]) -> _File:
+    """Read a recording; errors name the keys of its [[recording]], or those that all recordings share."""
+    try:
+        return _read_file(source, path, entry, files_of_all)
+    except BowdenfitError as error:
+        described = enumerate(source.description.recording)
+        numbers = [i for i, one in described if (one.file, one.where) == (entry.file, entry.where)]
+        if not path.exists():
+            error.key_path = ("file" if numbers else "files",)
+        key, *names = error.key_path or ("",)
+        is_own = numbers and key != "exclude" and (key != "channels" or names[0] in entry.channels)
+        error.put_below(*(("recording", numbers[0]) if is_own else ("tables", "recordings")))
+        raise
+
+
 def _read_file(source: Source, path: Path, entry: RecordingFile, files_of_all: Sequence[Path]) -> _File:
     description = source.description
     table = description.table(RecordingsTable)
@@ -327,7 +344,8 @@ def _check_channel_names(channels: Mapping[str, ColumnSource], description: Desc
     for name in channels:
         if name not in known:
             raise DescriptionError(
-                f"cable.toml, channels of recordings: no quantity is called {name!r}{suggest_name(name, known)}"
+                f"cable.toml, channels of recordings: no quantity is called {name!r}{suggest_name(name, known)}",
+                key_path=("channels", name),
             )
     return dict(channels)
 

@@ -31,7 +31,8 @@ def leave_out_spans(raw: RawRecording, spans: Sequence[tuple[float, float]]) -> 
         if not np.any((raw.input_time >= start) & (raw.input_time <= end)):
             raise DatasetError(
                 f"{raw.file}: exclude names {start:g} to {end:g} s, where there is no sample; the usual cause is a time of "
-                f"another recording. {raw.name} lasts from {first:.6g} to {last:.6g} s: correct the entry, or delete it."
+                f"another recording. {raw.name} lasts from {first:.6g} to {last:.6g} s: correct the entry, or delete it.",
+                key_path=("exclude",),
             )
     excluded = ExcludedStretches(tuple(spans), raw.input_force, raw.output_force)
     inputs = np.where(excluded.covers(raw.input_time), np.nan, raw.input_force)
@@ -39,7 +40,8 @@ def leave_out_spans(raw: RawRecording, spans: Sequence[tuple[float, float]]) -> 
     if min(np.isfinite(inputs).sum(), np.isfinite(outputs).sum()) < FEWEST_SAMPLES:
         raise DatasetError(
             f"{raw.file}: exclude leaves fewer than {FEWEST_SAMPLES} readings of {raw.name}; leave more of it in, or leave the "
-            "whole recording out."
+            "whole recording out.",
+            key_path=("exclude",),
         )
     return replace(raw, input_force=inputs, output_force=outputs, excluded=excluded)
 

@@ -42,6 +42,15 @@ def test_form_and_text_say_the_same_and_are_saved(chromium, axe, tmp_path, width
         page.get_by_text("It can be saved.").wait_for()
         assert tomllib.loads(page.input_value("#toml"))["sensors"]["force_noise"] == {"value": 0.5, "unit": "N"}
         assert faults_of(page) == []
+        page.get_by_text("Table of forces").click()
+        page.get_by_label("file", exact=True).fill("none.csv")
+        page.keyboard.press("Tab")
+        page.locator("#key-tables-forces-file-fault").get_by_text("none.csv does not exist").wait_for()
+        page.get_by_text("The measured files cannot be read as it says.").wait_for()
+        assert [*serious_findings(page, axe), *faults_of(page)] == []
+        page.get_by_label("file", exact=True).fill("forces.csv")
+        page.keyboard.press("Tab")
+        page.locator("#key-tables-forces-file-fault").wait_for(state="detached")
         text = page.input_value("#toml")
         page.fill("#toml", text.replace('name = "bench"', 'name = "bench" x'))
         page.get_by_text("This is no TOML").wait_for()

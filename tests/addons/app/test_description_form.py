@@ -4,8 +4,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from recorded_benches import RecordedBench, write
 
-from bowdenfit.addons.app.describe import find_faults
+from bowdenfit.addons.app.describe import find_data_error, find_faults
 from bowdenfit.addons.app.description_form import MENU, add_part, list_groups, set_field, show_value
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.kinds.descriptions import CableDescription, parse_description
@@ -69,7 +70,7 @@ def test_a_key_of_words_or_a_quantity_takes_both_and_says_so(typed, expected):
     assert "As estimated, none, or as a number with its unit, such as 10 ms." in field.hint
     changed = set_field(text, field, typed)
     assert tomllib.loads(changed)["tables"]["recordings"]["prepare"]["delay"] == expected
-    assert fields_of(changed)[field.path].value == typed and find_faults(changed) == []
+    assert fields_of(changed)[field.path].value == typed and find_faults(changed) == ()
     with pytest.raises(BowdenfitError, match=r"prepare\.delay: input should be .* or a number with its unit"):
         parse_description({**tomllib.loads(text), "tables": {"recordings": {"prepare": {"delay": "late"}}}})
 
@@ -95,11 +96,46 @@ def test_what_cannot_be_read_is_refused(path, typed, words):
 def test_parts_are_added_and_refused_by_the_name_of_others():
     text = add_part(BENCH, "contact", "ferrule")
     assert tomllib.loads(text)["contact"][-1]["name"] == "ferrule"
-    assert find_faults(text) == []
+    assert find_faults(text) == ()
     with pytest.raises(UsageError, match="not in use yet"):
         add_part(text, "contact", "ferrule")
-    assert "TOML" in find_faults("name = ")[0]
-    assert "unknown key 'sampler.walkers'" in find_faults(f"{BENCH}\n[sampler]\nwalkers = 3\n")[0]
+    assert "TOML" in str(find_faults("name = ")[0])
+    assert "unknown key 'sampler.walkers'" in str(find_faults(f"{BENCH}\n[sampler]\nwalkers = 3\n")[0])
+
+
+ONLY_IN_FILES = (
+    ("on-body", 'file = "efficiencies.csv"', 'file = "none.csv"', ("tables", "efficiencies", "file")),
+    ("on-body", '"efficiencies.csv"', '"efficiencies.csv", exclude = [{ rows = [99], reason = "x" }]',
+     ("tables", "efficiencies", "exclude")),
+    ("on-body", '"efficiencies.csv"', '"efficiencies.csv", columns = { efficiency = { name = "eff" } }',
+     ("tables", "efficiencies", "columns", "efficiency")),
+    ("on-body", '"efficiencies.csv"', '"efficiencies.csv", sheet = "x"', ("tables", "efficiencies", "sheet")),
+    ("on-body", 'column = "free_sheath_angle"', 'column = "knee"', ("contact", 0, "wrap_angle", "column")),
+    ("on-body", 'variable = "cable_length"', 'variable = "depth"', ("route", "variable")),
+    ("recorded", 'file = "r1.csv"', 'file = "none.csv"', ("recording", 1, "file")),
+    ("recorded", 'run = "m1"', 'channels = { input_force = { name = "ai7" } }', ("recording", 1, "channels", "input_force")),
+    ("recorded", "{}", '{ channels = { velocity = { name = "x" } } }', ("tables", "recordings", "channels", "velocity")),
+    ("recorded", "{}", '{ files = "*.tdms" }', ("tables", "recordings", "files")),
+    ("recorded", "{}", '{ exclude = [{ file = "no.csv", reason = "x" }] }', ("tables", "recordings", "exclude")),
+    ("recorded", "{}", '{ exclude = [{ file = "r0.csv", start = 900, end = 901, reason = "x" }] }',
+     ("tables", "recordings", "exclude")),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """A data set of tables, and one of recordings."""
+    bench = RecordedBench(rate=100.0, length=30.0, mountings=2)
+    return {"on-body": DATASETS / "on-body-exoskeleton", "recorded": write(bench, tmp_path_factory.mktemp("b") / "b", seed=4)}
+
+
+@pytest.mark.parametrize(("name", "old", "new", "keys"), ONLY_IN_FILES)
+def test_what_only_the_files_show_names_its_key(folders, name, old, new, keys):
+    text = (folders[name] / "cable.toml").read_text()
+    changed = text.replace(old, new, 1)
+    assert changed != text and find_data_error(text, folders[name]) is None and find_faults(changed) == ()
+    error = find_data_error(changed, folders[name])
+    assert keys in {fault.key_path for fault in error.faults or (error,)}
 
 
 def test_values_are_shown_as_they_are_typed():

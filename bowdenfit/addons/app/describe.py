@@ -1,10 +1,12 @@
 """The page on which a cable is described: a form for every key of its cable.toml, with the text next to it."""
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,6 @@ from nicegui import ui
 from bowdenfit.addons.app.curve_menu import is_of_curves, show_curve_menu
 from bowdenfit.addons.app.description_edit import read_description_text, write_description
 from bowdenfit.addons.app.description_form import (
-    MENU,
-    YES_NO,
     FormField,
     FormGroup,
     add_part,
@@ -22,6 +22,7 @@ from bowdenfit.addons.app.description_form import (
     set_field,
     table_kinds,
 )
+from bowdenfit.addons.app.description_values import MENU, YES_NO
 from bowdenfit.addons.app.elements import address, block, button, choice, field, markup, text, text_input
 from bowdenfit.addons.app.frame import attempt, frame, refused, section
 from bowdenfit.addons.app.page_words import page_words
@@ -67,6 +68,7 @@ class DescribePage:
         self._text = self._saved = read_description_text(workbench.data_set(name))
         self._open: set[str] = set()
         self._faults: tuple[BowdenfitError, ...] = ()
+        self._messages: dict[str, str] = {}
         self._data_error: BowdenfitError | None = None
         self._read_text = ""
         self._refused: dict[str, RefusedEntry] = {}
@@ -122,6 +124,7 @@ class DescribePage:
             except (tomllib.TOMLDecodeError, RecursionError):
                 text("The form comes back when the text is TOML again.", classes="hint")
                 return
+            self._messages = _place_faults(self._faults, groups)
             values = {entry.key: entry.value for group in groups for entry in group.fields}
             refused_entries = self._refused.items()  # but those that were changed in the text since
             self._refused = {key: entry for key, entry in refused_entries if values.get(key, "") == entry.kept}
@@ -133,15 +136,46 @@ class DescribePage:
         """Show one group, open where it was opened."""
         own_faults = [fault for fault in self._faults if fault.key_path and fault.key_path == group.path]
         faults = [str(fault) for fault in own_faults if not fault.row]
-        with block("details") as part:
-            text(group.title if group.is_stated else f"{group.title} (nothing stated)", "summary", dir="auto")
+        with self._details(group.title, group.is_stated, is_first or bool(faults), group.fields):
             for sentence in faults:
                 text(page_words(sentence), "p", "fault")
-            for entry in group.fields:
-                self._show_field(entry)
-        if is_first or group.title in self._open or faults or any(self._find_fault(entry) for entry in group.fields):
+            for (name, hint), fields in groupby(group.fields, lambda entry: (entry.part, entry.part_hint)):
+                entries = list(fields)
+                if not name:
+                    self._show_fields(entries)
+                    continue
+                with self._details(f"{group.title}, {name}", any(entry.value for entry in entries), False, entries, name):
+                    self._show_entries(hint, entries)
+
+    def _show_entries(self, hint: str, fields: Sequence[FormField]) -> None:
+        """Show a table of names or a list: what it does and what each key of an entry does once, then each entry in a row."""
+        keys = {entry.label: entry.hint for entry in fields if entry.entry}
+        for line in (hint, *(f"{label}: {words}" for label, words in keys.items() if words)):
+            text(page_words(line), classes="hint")
+        for name, of_entry in groupby(fields, lambda entry: entry.entry):
+            if not name:
+                self._show_fields(list(of_entry))
+                continue
+            with block("fieldset", "entry"):
+                text(name, "legend", dir="auto")
+                self._show_fields([replace(entry, hint="") for entry in of_entry])
+
+    @contextmanager
+    def _details(
+        self, key: str, is_stated: bool, is_open: bool, entries: Sequence[FormField], title: str = ""
+    ) -> Iterator[None]:
+        """Put fields below a heading that opens them; it is open where one of them is refused, or it was opened."""
+        with block("details") as part:
+            title = title or key
+            text(title if is_stated else f"{title} (nothing stated)", "summary", dir="auto")
+            yield
+        if is_open or key in self._open or any(self._find_fault(entry) for entry in entries):
             part.props["open"] = True
-        part.on("toggle", partial(self._note_open, group.title), js_handler="event => emit(event.target.open)")
+        part.on("toggle", partial(self._note_open, key), js_handler="event => emit(event.target.open)")
+
+    def _show_fields(self, entries: Sequence[FormField]) -> None:
+        for entry in entries:
+            self._show_field(entry)
 
     def _note_open(self, title: str, event: Any) -> None:
         (self._open.add if event.args else self._open.discard)(title)
@@ -161,14 +195,13 @@ class DescribePage:
                 else:
                     choice(entry.key, entry.value, choices, self._setter(entry))
             else:
-                text_input(entry.key, entry.value, self._setter(entry))
+                text_input(entry.key, entry.value, self._setter(entry), entry.example)
 
     def _find_fault(self, entry: FormField) -> str:
         """Return why a key is refused as it is, or as it is typed; empty where it is not."""
         if refusal := self._refused.get(entry.key):
             return refusal.fault
-        faults = (str(fault) for fault in self._faults if fault.key_path[: len(entry.path)] == entry.path)
-        return next(faults, "")
+        return self._messages.get(entry.key, "")
 
     def _setter(self, entry: FormField) -> Callable[[str], Any]:
         async def change(typed: str) -> None:
@@ -265,6 +298,18 @@ class DescribePage:
             )
         write_description(folder, self._text)
         ui.navigate.to(address("data", self._name))
+
+
+def _place_faults(faults: Sequence[BowdenfitError], groups: Sequence[FormGroup]) -> dict[str, str]:
+    """Return why fields are refused, by their keys: of each fault the first whose keys lead to its own, or are below them."""
+    messages: dict[str, str] = {}
+    for fault in faults:
+        keys = fault.key_path
+        inside = [entry for group in groups if len(keys) > len(group.path) for entry in group.fields]
+        fields = (entry for entry in inside if all(a == b for a, b in zip(entry.path, keys, strict=False)))
+        if (entry := next(fields, None)) is not None:
+            messages.setdefault(entry.key, str(fault))
+    return messages
 
 
 def find_faults(description: str) -> tuple[BowdenfitError, ...]:

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from bowdenfit.addons.app.description_values import new_entry
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import UsageError
 from bowdenfit.inputs import refuse_special
@@ -71,7 +72,7 @@ def _add_part(file: str, part: Part, reason: str, settings: Any) -> None:
         if isinstance(part, int) and entry["reason"] == reason and entry.get("file", file) == file:
             entry["rows"] = sorted({*entry["rows"], part})
             return
-    entry = tomlkit.inline_table()
+    entry = new_entry(entries)
     entry.update(({} if settings.get("file") == file else {"file": file}) | keys | {"reason": reason})
     entries.append(entry)
 
@@ -149,7 +150,7 @@ def _change_table(folder: Path, kind: str, change: Callable[[Any], None]) -> Any
     try:
         document = tomlkit.parse(read_description_text(folder))
         change(document["tables"][kind])
-    except (TOMLKitError, KeyError, TypeError, AttributeError):
+    except (TOMLKitError, KeyError, TypeError, ValueError, AttributeError):
         raise UsageError(
             f"cable.toml has no table {kind} that can be changed here; it was changed by hand, so load this page again, or "
             "edit the file itself."

@@ -1,22 +1,38 @@
 """Everything that a cable.toml can say, as fields of a form that its JSON schema describes."""
 
 import re
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from bowdenfit.arguments import read_quantity
+from bowdenfit.addons.app.description_values import (
+    CODES,
+    MENU,
+    NUMBER,
+    NUMBERS,
+    PAIR,
+    QUANTITY,
+    TEXT,
+    TEXTS,
+    TOML,
+    WHOLE,
+    YES_NO,
+    new_entry,
+    read_value,
+    show_value,
+)
 from bowdenfit.errors import UsageError
+from bowdenfit.kinds import KINDS
 from bowdenfit.questions.schema.schemas import make_schema
+from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED
+from bowdenfit.words import capitalized
 
 Path: TypeAlias = tuple[str | int, ...]
 Schema: TypeAlias = Mapping[str, Any]
-MENU, YES_NO, NUMBER, WHOLE, TEXT, QUANTITY, TOML = "menu", "yes or no", "number", "whole number", "text", "quantity", "TOML"
 _WHOLE_TOPICS = ("schema",)  # which nobody changes by hand
 _TITLES = {
     "route": "Route: what the design question varies", "contact": "Contact", "friction": "Friction coefficient",
@@ -24,16 +40,25 @@ _TITLES = {
     "recording": "Recording",
     "sensors": "Load cells", "errors": "Errors of the bench that no reading shows", "sampler": "Sampler",
 }  # fmt: skip
-_DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(\d+)")
-_PERCENT = re.compile(r"([+-]?\d+(?:\.\d+)?)\s*%")
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
-_EXAMPLES = {
-    "columns": '{ input_force = { name = "F1", unit = "N" } }',
-    "prior": "{ normal = { mean = 0.1, sd = 0.05 } }",
-    "measured": "{ value = 0.10, sd = 0.02 }",
-    "range": "[430, 530]",
-}
-_QUANTITIES = {"delay": "10 ms", "clock_shift": "10 ms", "block": "50 ms", "length": "500 mm"}
+_IN_TOML = re.compile(  # what a form does otherwise
+    r"(?:,? such as|:)? \[-?\d[^\]]*\]|:? ?\[ ?\{.*?\} ?\]| On the command line [^.]*\."
+)
+_EXAMPLES = {  # of what is typed
+    "missing": "-9999; n.d.", "quiet": "0 2.5", "rows": "7 9", "choices": "430 450 470", "sheet": "Pull",
+    "where": "{ run = 3 }",
+}  # fmt: skip
+_EXAMPLES_OF_KINDS = {PAIR: "430 530", NUMBERS: "430 450", TEXTS: "a.csv; b.csv", TOML: "{ key = 1 }"}
+_HOW_TYPED = {
+    PAIR: "Two numbers separated by a space.", NUMBERS: "Numbers separated by spaces.",
+    TEXTS: "Several separated by semicolons.", CODES: "Several separated by semicolons.", TOML: "As in TOML.",
+}  # fmt: skip
+_QUANTITIES = {
+    "delay": "10 ms", "clock_shift": "10 ms", "block": "50 ms", "length": "500 mm", "velocity": "10 mm/s",
+    "reference_velocity": "10 mm/s", "inertia": "1e-3 kg*m^2",
+}  # fmt: skip
+KnownNames: TypeAlias = Callable[[str, Path], Sequence[str]]
+"""Names that a table of names may have, by its key and the keys that lead to it."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +67,16 @@ class FormField:
 
     Args:
         path: Keys and numbers that lead to it.
-        label: Its key, with those above it in its group.
+        label: Its key, with those above it in its group or entry.
         kind: How it is typed.
         value: As it is typed; empty where the description leaves it out.
         hint: What it does, how it is written, and what holds where it is left out.
         options: Of a menu, or the words that do in place of a quantity.
         needed: Whether it may not be left out.
+        example: How it may be typed; empty where its hint says so.
+        part: Key of the list or table of names that it is in; empty for any other.
+        part_hint: What that does.
+        entry: Of which entry of that it is one of several fields; empty for any other.
     """
 
     path: Path
@@ -57,6 +86,10 @@ class FormField:
     hint: str
     options: tuple[str, ...] = ()
     needed: bool = False
+    example: str = ""
+    part: str = ""
+    part_hint: str = ""
+    entry: str = ""
 
     @property
     def key(self) -> str:
@@ -87,58 +120,101 @@ def list_groups(raw: Mapping[str, Any]) -> list[FormGroup]:
     Args:
         raw: The description as plain data, which may be wrong anywhere.
     """
-    page = _schema()
+    page, known = _schema(), partial(_list_known_names, raw)
     properties = {key: schema for key, schema in page["properties"].items() if key not in _WHOLE_TOPICS}
     plain = {key: schema for key, schema in properties.items() if key not in _TITLES}
-    groups = [FormGroup((), "The cable", tuple(_list_fields({"properties": plain, **_needed(page)}, raw, ())), True)]
+    groups = [FormGroup((), "The cable", tuple(_list_fields({"properties": plain, **_needed(page)}, raw, (), known)), True)]
     for key in (key for key in _TITLES if key in properties):
-        groups += _list_topic(key, properties[key], raw.get(key))
+        groups += _list_topic(key, properties[key], raw.get(key), known)
     return groups
 
 
-def _list_topic(key: str, schema: Schema, stated: Any) -> Iterator[FormGroup]:
+def _list_topic(key: str, schema: Schema, stated: Any, known: KnownNames) -> Iterator[FormGroup]:
     """Yield the groups of one top-level key: one for each entry where it has several."""
     target, title = _resolve(schema), _TITLES[key]
+    entries: list[tuple[str | int, Any, Schema]] = []
     if target.get("type") == "array":
-        for number, entry in enumerate(stated if isinstance(stated, list) else ()):
-            values = entry if isinstance(entry, Mapping) else {}
-            name = values.get("name") or values.get("file") or number + 1
-            path = key, number
-            yield FormGroup(path, f"{title} {name}", tuple(_list_fields(_resolve(target["items"]), values, path)), True)
-        return
-    values = stated if isinstance(stated, Mapping) else {}
-    if "additionalProperties" in target and isinstance(target["additionalProperties"], Mapping):
-        for name, entry in values.items():
-            of_name = entry if isinstance(entry, Mapping) else {}
-            fields = _list_fields(_resolve(target["additionalProperties"]), of_name, (key, name))
-            yield FormGroup((key, name), f"{title} {name}", tuple(fields), True)
-        return
-    if key == "tables":
-        for name, entry in values.items():
-            if name in target["properties"] and isinstance(entry, Mapping):
-                fields = _list_fields(_resolve(target["properties"][name]), entry, (key, name))
-                yield FormGroup((key, name), f"{title} {name}", tuple(fields), True)
-        return
-    yield FormGroup((key,), title, tuple(_list_fields(target, values, (key,))), bool(values))
+        stated = stated if isinstance(stated, list) else ()
+        entries = [(number, entry, target["items"]) for number, entry in enumerate(stated)]
+    elif isinstance(target.get("additionalProperties"), Mapping) or key == "tables":
+        kinds, stated = target.get("properties", {}), stated if isinstance(stated, Mapping) else {}
+        named = [name for name, entry in stated.items() if key != "tables" or (name in kinds and isinstance(entry, Mapping))]
+        entries = [(name, stated[name], kinds[name] if key == "tables" else target["additionalProperties"]) for name in named]
+    else:
+        values = stated if isinstance(stated, Mapping) else {}
+        yield FormGroup((key,), title, tuple(_list_fields(target, values, (key,), known)), bool(values))
+    for name, entry, of_entry in entries:
+        values = entry if isinstance(entry, Mapping) else {}
+        called = name if isinstance(name, str) else values.get("name") or values.get("file") or name + 1
+        fields = _list_fields(_resolve(of_entry), values, (key, name), known)
+        yield FormGroup((key, name), f"{title} {called}", tuple(fields), True)
 
 
-def _list_fields(target: Schema, values: Mapping[str, Any], path: Path, above: str = "") -> Iterator[FormField]:
-    """Yield the fields of an object; parts of it that are objects themselves are taken apart."""
+def _list_fields(
+    target: Schema, values: Mapping[str, Any], path: Path, known: KnownNames, above: str = "", is_optional: bool = False
+) -> Iterator[FormField]:
+    """Yield the fields of an object; parts of it that are objects or lists of them are taken apart."""
     for key, schema in target.get("properties", {}).items():
-        part, value = _resolve(schema), values.get(key)
-        here = (*path, key)
-        if "properties" in part and "unit" not in part["properties"] and _is_single(schema):
-            yield from _list_fields(part, value if isinstance(value, Mapping) else {}, here, f"{above}{key}.")
-            continue
-        if "curve" in part.get("properties", {}):  # a wrap angle, key by key
-            yield from _list_fields(part, value if isinstance(value, Mapping) else {}, here, f"{above}{key}.")
-            continue
-        kind, options = _kind_of(schema)
-        hint = _hint(key, schema, kind, options)
-        yield FormField(
-            here, f"{above}{key}", kind, "" if value is None else show_value(value), hint, options,
-            key in target.get("required", ()),
-        )  # fmt: skip
+        part, value, here = _resolve(schema), values.get(key), (*path, key)
+        keys, of_names = part.get("properties", {}), part.get("additionalProperties")
+        if _is_single(schema) and keys and ("curve" in keys or not {"value", "unit"} <= {*keys}):
+            inside = value if isinstance(value, Mapping) else {}
+            yield from _list_fields(part, inside, here, known, f"{above}{key}.", key not in target.get("required", ()))
+        elif _is_single(schema) and isinstance(of_names, Mapping) and "properties" in _resolve(of_names):
+            yield from _list_named(key, schema, value, here, known)
+        elif _is_single(schema) and "properties" in _resolve(part.get("items", {})):
+            yield from _list_entries(key, schema, value, here, known)
+        else:
+            needed = key in target.get("required", ()) and (bool(values) or not is_optional)
+            yield _make_field(here, f"{above}{key}", schema, value, needed)
+
+
+def _make_field(path: Path, label: str, schema: Schema, value: Any, needed: bool = False) -> FormField:
+    """Return the field of one key."""
+    (kind, options), key = _kind_of(schema), str(path[-1])
+    typed, hint = "" if value is None else show_value(value, kind), _hint(key, schema, kind, options)
+    example = _EXAMPLES.get(key, _EXAMPLES_OF_KINDS.get(kind, "")) if kind in _HOW_TYPED else ""
+    return FormField(path, label, kind, typed, hint, options, needed, example)
+
+
+def _list_named(key: str, schema: Schema, stated: Any, path: Path, known: KnownNames) -> Iterator[FormField]:
+    """Yield the fields of a table of names, of those that it may have and those that it has."""
+    entries = stated if isinstance(stated, Mapping) else {}
+    of_name = _resolve(_resolve(schema)["additionalProperties"])
+    is_quantity, hint = {"value", "unit"} <= {*of_name["properties"]}, _hint(key, schema, "", ())
+    for name in dict.fromkeys([*known(key, path), *entries]):
+        entry = entries.get(name)
+        fields: Iterable[FormField] = [_make_field((*path, name), name, of_name, entry)]
+        if not is_quantity:
+            inside = entry if isinstance(entry, Mapping) else {}
+            fields = _list_fields(of_name, inside, (*path, name), known, is_optional=True)
+            fields = (replace(field, entry=name) for field in fields)
+        yield from (replace(field, part=key, part_hint=hint) for field in fields)
+
+
+def _list_entries(key: str, schema: Schema, stated: Any, path: Path, known: KnownNames) -> Iterator[FormField]:
+    """Yield the fields of a list, and of one more entry."""
+    entries, of_entry = stated if isinstance(stated, list) else [], _resolve(_resolve(schema)["items"])
+    hint = _hint(key, schema, "", ())
+    for number, entry in enumerate([*entries, {}]):
+        inside, is_new = entry if isinstance(entry, Mapping) else {}, number == len(entries)
+        fields, called = _list_fields(of_entry, inside, (*path, number), known, is_optional=is_new), f"Entry {number + 1}"
+        yield from (replace(field, part=key, part_hint=hint, entry="One more" if is_new else called) for field in fields)
+
+
+def _list_known_names(raw: Mapping[str, Any], key: str, path: Path) -> list[str]:
+    """Return the names that a table of names may have in a description."""
+    contacts, route = raw.get("contact"), raw.get("route")
+    contacts = [contact for contact in contacts if isinstance(contact, Mapping)] if isinstance(contacts, list) else []
+    columns = [angle.get("column") for contact in contacts if isinstance(angle := contact.get("wrap_angle"), Mapping)]
+    of_cable = [*columns, route.get("variable", "cable_length")] if isinstance(route, Mapping) else columns
+    names = [name for name in (columns if key == "wrap_angles" else of_cable) if isinstance(name, str)]
+    if key == "channels":
+        names += [*(quantity.name for quantity in (*WANTED, *TORQUES)), OUTPUT_CLOCK]
+    kind = KINDS.get(str(path[1])) if key == "columns" else None
+    for wanted in kind.init_questions.columns if kind is not None and kind.init_questions is not None else ():
+        names += [quantity.name for quantity in (wanted.quantity, *wanted.also)]
+    return names
 
 
 def _kind_of(schema: Schema) -> tuple[str, tuple[str, ...]]:
@@ -149,6 +225,8 @@ def _kind_of(schema: Schema) -> tuple[str, tuple[str, ...]]:
     words = [option for part in parts for option in part.get("enum", [part["const"]] if "const" in part else [])]
     if words and any("value" in part.get("properties", {}) for part in parts):
         return QUANTITY, tuple(words)
+    if lists := [part for part in parts if part.get("type") == "array"]:
+        return _kind_of_list(lists[0]), ()
     if len(parts) != 1:
         return TOML, ()
     (part,) = parts
@@ -160,45 +238,26 @@ def _kind_of(schema: Schema) -> tuple[str, tuple[str, ...]]:
     return kinds.get(part.get("type", ""), TOML), ()
 
 
+def _kind_of_list(schema: Schema) -> str:
+    """Return how a list is typed."""
+    items = schema.get("prefixItems") or [schema.get("items", {})]
+    types = {_resolve(part).get("type") for item in items for part in item.get("anyOf", [item])}
+    if types <= {"number", "integer"}:
+        return PAIR if "prefixItems" in schema else NUMBERS
+    return TEXTS if types == {"string"} else CODES if types == {"string", "number"} else TOML
+
+
 def _hint(key: str, schema: Schema, kind: str, options: Sequence[str]) -> str:
     """Return what a key does, how it is written, and what holds where it is left out."""
-    words = [_LINK.sub(r"\1", schema.get("description", ""))]
+    words = [capitalized(_IN_TOML.sub("", _LINK.sub(r"\1", schema.get("description", ""))).lstrip(" ,"))]
     if kind == QUANTITY:
         others = f"As {', '.join(options)}, or as a" if options else "A"
         words.append(f"{others} number with its unit, such as {_QUANTITIES.get(key, '0.5 N or 45 deg')}.")
-    words += [f"As in TOML{_example(key)}."] if kind == TOML else []
+    words += [_HOW_TYPED[kind]] if kind in _HOW_TYPED else []
     default = schema.get("default")
     if default not in (None, "", [], {}) and not isinstance(default, Mapping):
         words.append(f"If left out: {show_value(default)}.")
     return " ".join(word for word in words if word)
-
-
-def _example(key: str) -> str:
-    return f", such as {_EXAMPLES[key]}" if key in _EXAMPLES else ""
-
-
-def show_value(value: Any) -> str:
-    """Return a value as it is typed into a field."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, Mapping) and set(value) == {"value", "unit"} and isinstance(value["value"], int | float):
-        return f"{value['value']:.12g} {value['unit']}"
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_as_toml(part)}" for key, part in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_as_toml(part) for part in value) + "]"
-    return str(value)
-
-
-def _as_toml(value: Any) -> str:
-    """Return a value inside of another as TOML."""
-    if isinstance(value, str):
-        return tomlkit.string(value).as_string()
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_as_toml(part)}" for key, part in value.items()) + " }"
-    return show_value(value)
 
 
 def set_field(text: str, field: FormField, typed: str) -> str:
@@ -212,35 +271,43 @@ def set_field(text: str, field: FormField, typed: str) -> str:
     Raises:
         UsageError: It cannot be read as what the field holds, or the text is no TOML.
     """
-    value = _read_value(field, typed.strip())
+    value = read_value(": ".join(filter(None, (field.entry, field.label))), field.kind, field.options, typed.strip())
     document = _parse(text)
     *parents, last = field.path
     try:
         node: Any = document
         for depth, part in enumerate(parents):
-            if isinstance(part, str) and part not in node:
+            if part >= len(node) if isinstance(part, int) else part not in node:
                 if value is None:
                     return text
-                node[part] = tomlkit.table() if depth == 0 else tomlkit.inline_table()
+                is_list = isinstance(field.path[depth + 1], int)
+                new = tomlkit.array() if is_list else tomlkit.table() if depth == 0 else new_entry(node)
+                if isinstance(part, int):
+                    node.append(new)
+                else:
+                    node[part] = new
             node = node[part]
         if value is None:
             node.pop(last, None)
+            _remove_empty(document, parents)
         else:
             node[last] = value
-        if not node and len(parents) in (1, 2) and isinstance(parents[-1], str) and parents[0] not in ("tables", "contact"):
-            _remove(document, parents)
-    except (TOMLKitError, KeyError, IndexError, TypeError, AttributeError):
+    except (TOMLKitError, LookupError, TypeError, ValueError, AttributeError):
         raise UsageError(f"{field.label} cannot be changed here, as cable.toml says it otherwise; edit the text.") from None
     return tomlkit.dumps(document)
 
 
-def _remove(document: Any, path: Sequence[str | int]) -> None:
-    """Remove a part of a document that says nothing any more."""
-    *parents, last = path
-    node = document
-    for part in parents:
-        node = node[part]
-    node.pop(last, None)
+def _remove_empty(document: Any, path: Sequence[str | int]) -> None:
+    """Remove what leads to a key and says nothing any more; a contact, a recording or a table stays."""
+    while path and not (path[0] in ("tables", "contact", "recording") and len(path) <= 2):
+        *parents, last = path
+        above = document
+        for part in parents:
+            above = above[part]
+        if len(above[last]):
+            return
+        del above[last]
+        path = parents
 
 
 def add_part(text: str, topic: str, name: str) -> str:
@@ -275,29 +342,6 @@ def add_part(text: str, topic: str, name: str) -> str:
 def table_kinds() -> list[str]:
     """Kinds of tables that a description can name."""
     return list(_resolve(_schema()["properties"]["tables"])["properties"])
-
-
-def _read_value(field: FormField, typed: str) -> Any:
-    """Return what is typed into a field as a value of TOML; None for an empty one."""
-    if not typed:
-        return None
-    if field.kind in (TEXT, MENU) or (field.kind == QUANTITY and typed in field.options):
-        return typed
-    if field.kind in (NUMBER, QUANTITY):
-        typed = _DECIMAL_COMMA.sub(r"\1.\2", typed)
-    if field.kind == NUMBER and (share := _PERCENT.fullmatch(typed)):
-        typed = f"{float(share[1]) / 100:.12g}"
-    if field.kind == QUANTITY and not typed.startswith("{"):
-        number, unit = read_quantity(typed, field.label, "0.5 N")
-        return tomlkit.inline_table().append("value", int(number) if number.is_integer() else number).append("unit", unit)
-    try:
-        value: Any = tomllib.loads(f"value = {typed}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
-        value = typed
-    expected = {NUMBER: (int, float), WHOLE: (int,), YES_NO: (bool,)}.get(field.kind, (object,))
-    if not isinstance(value, expected) or (field.kind != YES_NO and isinstance(value, bool) and field.kind != TOML):
-        raise UsageError(f"{field.label}: {typed!r} is not a {field.kind}; write one, or clear the field to leave the key out.")
-    return tomlkit.item(value)
 
 
 def _parse(text: str) -> Any:

@@ -43,14 +43,24 @@ def test_form_and_text_say_the_same_and_are_saved(chromium, axe, tmp_path, width
         assert tomllib.loads(page.input_value("#toml"))["sensors"]["force_noise"] == {"value": 0.5, "unit": "N"}
         assert faults_of(page) == []
         page.get_by_text("Table of forces").click()
-        page.get_by_label("file", exact=True).fill("none.csv")
+        page.locator("#key-tables-forces-file").fill("none.csv")
         page.keyboard.press("Tab")
         page.locator("#key-tables-forces-file-fault").get_by_text("none.csv does not exist").wait_for()
         page.get_by_text("The measured files cannot be read as it says.").wait_for()
         assert [*serious_findings(page, axe), *faults_of(page)] == []
-        page.get_by_label("file", exact=True).fill("forces.csv")
+        page.locator("#key-tables-forces-file").fill("forces.csv")
         page.keyboard.press("Tab")
         page.locator("#key-tables-forces-file-fault").wait_for(state="detached")
+        page.get_by_text("exclude (nothing stated)").focus()
+        page.keyboard.press("Enter")
+        page.keyboard.press("Tab")
+        page.keyboard.type("5")
+        page.keyboard.press("Tab")
+        page.locator("#key-tables-forces-exclude-0-reason-fault").wait_for()
+        assert [*serious_findings(page, axe), *faults_of(page)] == []
+        page.keyboard.type("slipped")
+        page.keyboard.press("Tab")
+        page.get_by_text("It can be saved.").wait_for()
         text = page.input_value("#toml")
         page.fill("#toml", text.replace('name = "bench"', 'name = "bench" x'))
         page.get_by_text("This is no TOML").wait_for()
@@ -63,3 +73,4 @@ def test_form_and_text_say_the_same_and_are_saved(chromium, axe, tmp_path, width
         page.get_by_text("Everything could be read").first.wait_for()
     saved = tomllib.loads((folder / "cable.toml").read_text())
     assert (saved["name"], saved["sensors"]["force_noise"]["value"]) == ("bench 2", 0.5)
+    assert saved["tables"]["forces"]["exclude"] == [{"rows": [5], "reason": "slipped"}]

@@ -7,7 +7,8 @@ import pytest
 from recorded_benches import RecordedBench, write
 
 from bowdenfit.addons.app.describe import find_data_error, find_faults
-from bowdenfit.addons.app.description_form import MENU, add_part, list_groups, set_field, show_value
+from bowdenfit.addons.app.description_form import add_part, list_groups, set_field
+from bowdenfit.addons.app.description_values import MENU, TOML, show_value
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.kinds.descriptions import CableDescription, parse_description
 
@@ -43,6 +44,12 @@ def test_typing_what_stands_there_changes_nothing(name):
         (("sensors", "force_noise"), "0.5 N", {"value": 0.5, "unit": "N"}),
         (("contact", 0, "wrap_angle", "curve"), "smooth", "smooth"),
         (("route", "range"), "[420, 540]", [420, 540]),
+        (("route", "range"), "420,5 540", [420.5, 540]),
+        (("route", "choices"), "430, 440 450; 460", [430, 440, 450, 460]),
+        (("contact", 1, "wrap_angle", "published_range"), "430 500", [430, 500]),
+        (("tables", "efficiencies", "missing"), "-9999; n.d.; -1,5", [-9999, "n.d.", -1.5]),
+        (("tables", "efficiencies", "sheet"), "Pull 1", "Pull 1"),
+        (("tables", "efficiencies", "columns", "efficiency", "name"), "eta", "eta"),
         (("noise",), "student", "student"),
         (("sampler", "max_steps"), "40000", 40000),
         (("reference_force",), "50 N", {"value": 50, "unit": "N"}),
@@ -61,6 +68,34 @@ def test_a_field_is_written_where_a_hand_would_write_it(path, typed, expected):
     cleared = set_field(text, fields_of(text)[path], "")
     original = fields_of(BENCH)[path].value
     assert fields_of(cleared)[path].value == ("" if not original or path[0] in ("contact", "route") else original)
+    assert original or tomllib.loads(cleared) == tomllib.loads(BENCH)
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "entry"),
+    [
+        ("on-body-exoskeleton", ("tables", "efficiencies", "exclude", 0), {"rows": "4 5", "reason": "slipped"}),
+        ("synthetic-recordings", ("tables", "recordings", "exclude", 0), {"start": "1.5", "end": "2", "reason": "leaned"}),
+        ("synthetic-recordings", ("recording", 1, "strokes", 0), {"start": "0", "end": "2.4", "stroke": "pull"}),
+        ("synthetic-recordings", ("tables", "recordings", "prepare", "limits"), {"low": "0", "high": "90", "unit": "N"}),
+        ("synthetic-recordings", ("recording", 1, "channels", "input_force"), {"name": "ai0", "unit": "V", "gain": "9.8"}),
+    ],
+)
+def test_lists_and_tables_of_names_are_typed_key_by_key(name, path, entry):
+    text = original = (DATASETS / name / "cable.toml").read_text()
+    for key, typed in entry.items():
+        text = set_field(text, fields_of(text)[*path, key], typed)
+    assert find_faults(text) == ()
+    assert {key: fields_of(text)[*path, key].value for key in entry} == entry
+    for key in entry:
+        text = set_field(text, fields_of(text)[*path, key], "")
+    assert tomllib.loads(text) == tomllib.loads(original)
+
+
+def test_of_real_data_sets_nothing_is_typed_as_toml_but_what_has_free_names():
+    for path in DATASETS.glob("*/cable.toml"):
+        fields = fields_of(path.read_text()).values()
+        assert {field.path[-1] for field in fields if field.kind == TOML} <= {"where"}
 
 
 @pytest.mark.parametrize(("typed", "expected"), [("10 ms", {"value": 10, "unit": "ms"}), ("none", "none")])
@@ -86,6 +121,9 @@ def test_curves_are_a_menu():
         (("sensors", "input_gain_error_sd"), "much", "is not a number"),
         (("sensors", "force_noise"), "0.5", "not a number with its unit"),
         (("sampler", "max_steps"), "1.5", "is not a whole number"),
+        (("route", "range"), "430", "write two numbers"),
+        (("route", "choices"), "430,440", "write numbers separated by spaces"),
+        (("route", "choices"), "430 long", "write numbers separated by spaces"),
     ],
 )
 def test_what_cannot_be_read_is_refused(path, typed, words):

@@ -219,6 +219,16 @@ def test_a_recording_that_is_refused_is_drawn_with_the_place_of_the_fault(tmp_pa
     assert places == [] and np.ptp(chart.groups[1].series[0].values) == 0
 
 
+def test_what_is_left_out_is_added_to_entries_with_headings_of_their_own(bench):
+    entry = '\n[[tables.forces.exclude]]\nrows = [3]\nreason = "typed twice"\n'
+    text = (bench / "cable.toml").read_text()
+    text = text.replace('forces = { file = "forces.csv" }', '[tables.forces]\nfile = "forces.csv"')
+    (bench / "cable.toml").write_text(text.replace("# the end", f"{entry}# the end"))
+    exclude_part(bench, "forces", "forces.csv", 6, "slipped")
+    entries = tomllib.loads((bench / "cable.toml").read_text())["tables"]["forces"]["exclude"]
+    assert entries == [{"rows": [3], "reason": "typed twice"}, {"rows": [6], "reason": "slipped"}]
+
+
 def test_a_reason_is_needed(bench):
     with pytest.raises(UsageError, match="200 characters"):
         exclude_part(bench, "forces", "forces.csv", 3, "x" * 201)

@@ -77,7 +77,7 @@ class DescribePage:
             text("Every key that cable.toml may have. What is left empty is left out, and then holds what is said below it.")
             self._status = block("div", role="status", id="description-status")
             with block("div", "describing"):
-                self._form = block("div", id="description-form")
+                self._form = block("fieldset", "whole-form", id="description-form", aria_label="Keys")
                 with block("div", "beside"), section("cable.toml", "description-text"):
                     self._editor = block("div")
             self._draw()
@@ -112,18 +112,18 @@ class DescribePage:
                 self._show_status()
 
     def _draw_form(self) -> None:
-        """Show the groups of the form; of a text that is no TOML nothing, so that nothing of it is lost."""
+        """Show the groups of the form; of a text that is no TOML as they were, to be used again when it is."""
+        try:
+            groups = list_groups(tomllib.loads(self._text))
+        except (tomllib.TOMLDecodeError, RecursionError):
+            self._form.props["disabled"] = True
+            return
+        self._form.props.pop("disabled", None)
         self._form.clear()
-        self._faults = find_faults(self._text)
-        data_error = self._data_error
+        self._faults, data_error = find_faults(self._text), self._data_error
         if not self._faults and data_error is not None:
             self._faults = data_error.faults or (data_error,)
         with self._form:
-            try:
-                groups = list_groups(tomllib.loads(self._text))
-            except (tomllib.TOMLDecodeError, RecursionError):
-                text("The form comes back when the text is TOML again.", classes="hint")
-                return
             self._messages = _place_faults(self._faults, groups)
             values = {entry.key: entry.value for group in groups for entry in group.fields}
             refused_entries = self._refused.items()  # but those that were changed in the text since
@@ -317,7 +317,8 @@ def find_faults(description: str) -> tuple[BowdenfitError, ...]:
     try:
         parse_description(tomllib.loads(description))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        return (UsageError(f"This is no TOML: {error}. The usual cause is a missing quotation mark or bracket there."),)
+        cause = "The usual cause is a missing quotation mark or bracket there; the form can be used again when it is corrected."
+        return (UsageError(f"This is no TOML: {error}. {cause}"),)
     except BowdenfitError as error:
         return error.faults or (error,)
     return ()

@@ -67,7 +67,6 @@ def test_form_and_text_say_the_same_and_are_saved(chromium, axe, tmp_path, width
         page.get_by_role("button", name="Save cable.toml").click(delay=300)  # as long as a hand's: nothing moves meanwhile
         page.get_by_text("cable.toml is as it was.").wait_for()
         page.locator("#key-name:disabled").wait_for()
-        assert [*serious_findings(page, axe), *faults_of(page)] == []
         page.fill("#toml", text.replace('name = "bench"', 'name = "bench 2"'))
         page.get_by_text("It can be saved.").wait_for()
         page.keyboard.press("Tab")

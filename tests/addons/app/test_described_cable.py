@@ -33,6 +33,8 @@ def test_form_and_text_say_the_same_and_are_saved(chromium, axe, tmp_path, width
         assert [*serious_findings(page, axe), *faults_of(page)] == []
         page.get_by_role("button", name="Save cable.toml").click()
         page.get_by_text("a field holds what cannot be taken").wait_for()
+        page.get_by_role("button", name="Close").click()
+        page.locator(".q-notification").wait_for(state="detached")  # whose contrast is none while it fades
         page.get_by_label("offset_sd", exact=True).fill("1 N")
         page.keyboard.press("Tab")
         page.wait_for_function("document.querySelector('#toml').value.includes('offset_sd')")

@@ -187,7 +187,8 @@ def _learn(
     for name, single in readings.items():  # parameters do not follow readings inside cells
         information, gradient = information + single.T @ single, gradient + single.T @ inside[name]
     information = (information + information.T) / 2
-    covariance = np.linalg.inv(np.eye(len(numbers)) + information)
+    of_direction, directions = np.linalg.eigh(information)  # below 0 by rounding alone, where readings say nothing
+    covariance = (directions / (1 + np.maximum(of_direction, 0.0))) @ directions.T
     return LearnedErrors(sources, np.array(numbers), -covariance @ gradient, covariance, information, moves, errors, readings)
 
 

@@ -120,53 +120,53 @@ def list_groups(raw: Mapping[str, Any]) -> list[FormGroup]:
     Args:
         raw: The description as plain data, which may be wrong anywhere.
     """
-    page, known = _schema(), partial(_list_known_names, raw)
+    page, names_of = _schema(), partial(_list_known_names, raw)
     properties = {key: schema for key, schema in page["properties"].items() if key not in _WHOLE_TOPICS}
     plain = {key: schema for key, schema in properties.items() if key not in _TITLES}
-    groups = [FormGroup((), "The cable", tuple(_list_fields({"properties": plain, **_needed(page)}, raw, (), known)), True)]
+    groups = [FormGroup((), "The cable", tuple(_list_fields({"properties": plain, **_needed(page)}, raw, (), names_of)), True)]
     for key in (key for key in _TITLES if key in properties):
-        groups += _list_topic(key, properties[key], raw.get(key), known)
+        groups += _list_topic(key, properties[key], raw.get(key), names_of)
     return groups
 
 
-def _list_topic(key: str, schema: Schema, stated: Any, known: KnownNames) -> Iterator[FormGroup]:
+def _list_topic(key: str, schema: Schema, written: Any, names_of: KnownNames) -> Iterator[FormGroup]:
     """Yield the groups of one top-level key: one for each entry where it has several."""
     target, title = _resolve(schema), _TITLES[key]
     entries: list[tuple[str | int, Any, Schema]] = []
     if target.get("type") == "array":
-        stated = stated if isinstance(stated, list) else ()
-        entries = [(number, entry, target["items"]) for number, entry in enumerate(stated)]
+        written = written if isinstance(written, list) else ()
+        entries = [(number, entry, target["items"]) for number, entry in enumerate(written)]
     elif isinstance(target.get("additionalProperties"), Mapping) or key == "tables":
-        kinds, stated = target.get("properties", {}), stated if isinstance(stated, Mapping) else {}
-        named = [name for name, entry in stated.items() if key != "tables" or (name in kinds and isinstance(entry, Mapping))]
-        entries = [(name, stated[name], kinds[name] if key == "tables" else target["additionalProperties"]) for name in named]
+        kinds, written = target.get("properties", {}), written if isinstance(written, Mapping) else {}
+        named = [name for name, entry in written.items() if key != "tables" or (name in kinds and isinstance(entry, Mapping))]
+        entries = [(name, written[name], kinds[name] if key == "tables" else target["additionalProperties"]) for name in named]
     else:
-        values = stated if isinstance(stated, Mapping) else {}
-        yield FormGroup((key,), title, tuple(_list_fields(target, values, (key,), known)), bool(values))
+        values = written if isinstance(written, Mapping) else {}
+        yield FormGroup((key,), title, tuple(_list_fields(target, values, (key,), names_of)), bool(values))
     for name, entry, of_entry in entries:
         values = entry if isinstance(entry, Mapping) else {}
         called = name if isinstance(name, str) else values.get("name") or values.get("file") or name + 1
-        fields = _list_fields(_resolve(of_entry), values, (key, name), known)
+        fields = _list_fields(_resolve(of_entry), values, (key, name), names_of)
         yield FormGroup((key, name), f"{title} {called}", tuple(fields), True)
 
 
 def _list_fields(
-    target: Schema, values: Mapping[str, Any], path: Path, known: KnownNames, above: str = "", is_optional: bool = False
+    target: Schema, values: Mapping[str, Any], path: Path, names_of: KnownNames, above: str = "", is_optional: bool = False
 ) -> Iterator[FormField]:
     """Yield the fields of an object; parts of it that are objects or lists of them are taken apart."""
     for key, schema in target.get("properties", {}).items():
-        part, value, here = _resolve(schema), values.get(key), (*path, key)
+        part, value, key_path = _resolve(schema), values.get(key), (*path, key)
         keys, of_names = part.get("properties", {}), part.get("additionalProperties")
         if _is_single(schema) and keys and ("curve" in keys or not {"value", "unit"} <= {*keys}):
             inside = value if isinstance(value, Mapping) else {}
-            yield from _list_fields(part, inside, here, known, f"{above}{key}.", key not in target.get("required", ()))
+            yield from _list_fields(part, inside, key_path, names_of, f"{above}{key}.", key not in target.get("required", ()))
         elif _is_single(schema) and isinstance(of_names, Mapping) and "properties" in _resolve(of_names):
-            yield from _list_named(key, schema, value, here, known)
+            yield from _list_named(key, schema, value, key_path, names_of)
         elif _is_single(schema) and "properties" in _resolve(part.get("items", {})):
-            yield from _list_entries(key, schema, value, here, known)
+            yield from _list_entries(key, schema, value, key_path, names_of)
         else:
             needed = key in target.get("required", ()) and (bool(values) or not is_optional)
-            yield _make_field(here, f"{above}{key}", schema, value, needed)
+            yield _make_field(key_path, f"{above}{key}", schema, value, needed)
 
 
 def _make_field(path: Path, label: str, schema: Schema, value: Any, needed: bool = False) -> FormField:
@@ -177,28 +177,28 @@ def _make_field(path: Path, label: str, schema: Schema, value: Any, needed: bool
     return FormField(path, label, kind, typed, hint, options, needed, example)
 
 
-def _list_named(key: str, schema: Schema, stated: Any, path: Path, known: KnownNames) -> Iterator[FormField]:
+def _list_named(key: str, schema: Schema, written: Any, path: Path, names_of: KnownNames) -> Iterator[FormField]:
     """Yield the fields of a table of names, of those that it may have and those that it has."""
-    entries = stated if isinstance(stated, Mapping) else {}
+    entries = written if isinstance(written, Mapping) else {}
     of_name = _resolve(_resolve(schema)["additionalProperties"])
     is_quantity, hint = {"value", "unit"} <= {*of_name["properties"]}, _hint(key, schema, "", ())
-    for name in dict.fromkeys([*known(key, path), *entries]):
+    for name in dict.fromkeys([*names_of(key, path), *entries]):
         entry = entries.get(name)
         fields: Iterable[FormField] = [_make_field((*path, name), name, of_name, entry)]
         if not is_quantity:
             inside = entry if isinstance(entry, Mapping) else {}
-            fields = _list_fields(of_name, inside, (*path, name), known, is_optional=True)
+            fields = _list_fields(of_name, inside, (*path, name), names_of, is_optional=True)
             fields = (replace(field, entry=name) for field in fields)
         yield from (replace(field, part=key, part_hint=hint) for field in fields)
 
 
-def _list_entries(key: str, schema: Schema, stated: Any, path: Path, known: KnownNames) -> Iterator[FormField]:
+def _list_entries(key: str, schema: Schema, written: Any, path: Path, names_of: KnownNames) -> Iterator[FormField]:
     """Yield the fields of a list, and of one more entry."""
-    entries, of_entry = stated if isinstance(stated, list) else [], _resolve(_resolve(schema)["items"])
+    entries, of_entry = written if isinstance(written, list) else [], _resolve(_resolve(schema)["items"])
     hint = _hint(key, schema, "", ())
     for number, entry in enumerate([*entries, {}]):
         inside, is_new = entry if isinstance(entry, Mapping) else {}, number == len(entries)
-        fields, called = _list_fields(of_entry, inside, (*path, number), known, is_optional=is_new), f"Entry {number + 1}"
+        fields, called = _list_fields(of_entry, inside, (*path, number), names_of, is_optional=is_new), f"Entry {number + 1}"
         yield from (replace(field, part=key, part_hint=hint, entry="One more" if is_new else called) for field in fields)
 
 

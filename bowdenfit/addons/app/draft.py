@@ -144,9 +144,9 @@ class Draft:
         return self.folder / name
 
     def _forget_excluded(self, name: str, rows: int = 0) -> None:
-        kept = self.excluded.items()
+        entries = self.excluded.items()
         self.excluded = {
-            key: reason for key, reason in kept if key[1] != name or (isinstance(key[2], int) and key[2] <= rows)
+            key: reason for key, reason in entries if key[1] != name or (isinstance(key[2], int) and key[2] <= rows)
         }
 
     def remove_file(self, name: str) -> None:

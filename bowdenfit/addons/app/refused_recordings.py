@@ -45,9 +45,9 @@ def sketch_refused(paths: Sequence[Path], refusals: Sequence[Refusal]) -> tuple[
     """
     pictures = list[Picture]()
     for path in paths:
-        own = [refusal for refusal in refusals if path.name == refusal.file or path.name in refusal.sentence]
+        of_file = [refusal for refusal in refusals if path.name == refusal.file or path.name in refusal.sentence]
         with suppress(BowdenfitError):
-            signals, faults = _read_signals(path, own) if own else ([], {})
+            signals, faults = _read_signals(path, of_file) if of_file else ([], {})
             if any(len(signal.values) >= _FEWEST for signal in signals):
                 pictures.append(_draw(path.name, f"refused-{len(pictures)}", signals, faults))
     return tuple(pictures)
@@ -122,5 +122,5 @@ def _draw_line(signal: _Signal, color: str, by_clock: bool) -> SeriesGroup:
 def _mark_faults(signal: _Signal, faults: dict[int, str], by_clock: bool) -> Iterator[Span]:
     """Yield an upright line for each fault."""
     for sample, label in sorted(faults.items()):
-        at = float(signal.time[sample]) if by_clock and signal.time is not None else sample + 1.0
-        yield Span(label, "bad", at, at)
+        place = float(signal.time[sample]) if by_clock and signal.time is not None else sample + 1.0
+        yield Span(label, "bad", place, place)

@@ -255,8 +255,9 @@ def require_column(
         return columns[name]
     read = {column.heading for column in columns.values()}
     is_second = name == "output_force" and "input_force" not in columns
-    with table.faults.collect(key_path):
-        raise _missing_column_error(table, name, example, read, is_second)
+    error = _missing_column_error(table, name, example, read, is_second)
+    error.key_path = key_path
+    table.faults.faults.append(error)
     return _missing_column(table, name)
 
 

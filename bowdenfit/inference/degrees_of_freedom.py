@@ -6,9 +6,9 @@ References:
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import ndtri, stdtrit
 
 from bowdenfit.types import Vector
@@ -16,6 +16,7 @@ from bowdenfit.types import Vector
 # Degrees of freedom from which on the shape of some thousand draws does not differ from a normal one by more than it scatters
 # (the ratio of widths below by 2 %). A judgement.
 LARGEST_DEGREES = 50.0
+_DEGREES = np.geomspace(1.0, LARGEST_DEGREES, 500)  # between which degrees are interpolated, to a part in thousands
 
 
 def coverage_factor(degrees: float, probability: float) -> float:
@@ -27,6 +28,17 @@ def coverage_factor(degrees: float, probability: float) -> float:
     """
     end = (1 + probability) / 2
     return float(ndtri(end) if math.isinf(degrees) else stdtrit(degrees, end))
+
+
+def effective_degrees_of_freedom(standard: Sequence[float], degrees: Sequence[float]) -> float:
+    """Return the effective degrees of freedom by the Welch-Satterthwaite formula (GUM G.4.1, equation G.2b).
+
+    Args:
+        standard: Contributions to the standard uncertainty, independent of each other [unit of the result].
+        degrees: Degrees of freedom of each; infinite for limits that are taken as known (GUM G.4.3).
+    """
+    spread = sum(u**4 / freedom for u, freedom in zip(standard, degrees, strict=True))
+    return sum(u**2 for u in standard) ** 2 / spread if spread > 0 else math.inf
 
 
 def fit_t_distribution(draws: Vector) -> tuple[float, float]:
@@ -43,15 +55,6 @@ def fit_t_distribution(draws: Vector) -> tuple[float, float]:
     """
     low, first, third, high = np.quantile(draws, (0.025, 0.25, 0.75, 0.975))
     ratio = (high - low) / (third - first) if third > first else 0.0
-    if ratio <= _width_ratio(LARGEST_DEGREES):
-        degrees = math.inf
-    elif ratio >= _width_ratio(1.0):
-        degrees = 1.0
-    else:
-        degrees = float(brentq(lambda degrees: _width_ratio(degrees) - ratio, 1.0, LARGEST_DEGREES))
+    width_ratios = stdtrit(_DEGREES, 0.975) / stdtrit(_DEGREES, 0.75)  # of a central 95 % interval to a 50 % one: they fall
+    degrees = float(np.interp(-ratio, -width_ratios, _DEGREES, right=math.inf))
     return float(high - low) / 2 / coverage_factor(degrees, 0.95), degrees
-
-
-def _width_ratio(degrees: float) -> float:
-    """Return the width of the central 95 % interval of a t distribution over that of its central 50 % interval."""
-    return float(stdtrit(degrees, 0.975) / stdtrit(degrees, 0.75))

@@ -19,7 +19,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.bench_errors import CONTRADICTION, LearnedErrors, learn_errors
-from bowdenfit.inference.degrees_of_freedom import fit_t_distribution
+from bowdenfit.inference.degrees_of_freedom import effective_degrees_of_freedom, fit_t_distribution
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.bench_error import STEP, ErrorSource
@@ -230,9 +230,8 @@ def error_budget(fit: Record) -> ErrorBudget | None:
             for number, source in enumerate(learned.sources)
         }
         scale, degrees = fit_t_distribution(draws)
-        variance = scale**2 + sum(shift**2 for shift in shifts.values())
-        effective = degrees * (variance / scale**2) ** 2 if scale > 0 else np.inf
-        rows.append(BudgetRow(name, unit, Interval.of(draws), Interval.of(moved), shifts, float(effective)))
+        effective = effective_degrees_of_freedom([scale, *shifts.values()], [degrees, *[np.inf] * len(shifts)])
+        rows.append(BudgetRow(name, unit, Interval.of(draws), Interval.of(moved), shifts, effective))
     return ErrorBudget(learned.sources, tuple(rows), _list_learned(learned))
 
 

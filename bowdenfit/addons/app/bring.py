@@ -329,6 +329,6 @@ def _show_writing(workbench: Workbench, draft: Draft) -> None:
             button("Write the data set", lambda: attempt(write), "primary")
         if not draft.is_described:
             then = "; what is left out goes into cable.toml, as above" if draft.excluded else ""
-            where = f"In the folder of the files; it asks the same questions{then}:"
-            command = EquivalentCommand([""], where, key="init-command")
+            hint = f"In the folder of the files; it asks the same questions{then}:"
+            command = EquivalentCommand([""], hint, key="init-command")
             show_init()

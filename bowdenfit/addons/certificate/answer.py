@@ -19,12 +19,11 @@ from bowdenfit.addons.certificate.laboratory import CellCertificate, LaboratoryF
 from bowdenfit.addons.certificate.uncertainty import (
     UncertaintyComponent,
     combined_standard_uncertainty,
-    effective_degrees_of_freedom,
     symmetric_interval,
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import BowdenfitError, UsageError, suggest_name
-from bowdenfit.inference.degrees_of_freedom import coverage_factor, fit_t_distribution
+from bowdenfit.inference.degrees_of_freedom import coverage_factor, effective_degrees_of_freedom, fit_t_distribution
 from bowdenfit.questions.error_budget import error_budget, list_answers, with_bench_errors
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
@@ -79,7 +78,7 @@ class CertifiedQuantity:
     @property
     def degrees(self) -> float:
         """Effective degrees of freedom, by Welch and Satterthwaite."""
-        return effective_degrees_of_freedom(self.budget)
+        return effective_degrees_of_freedom([part.standard for part in self.budget], [part.degrees for part in self.budget])
 
     @property
     def gum_standard(self) -> float:

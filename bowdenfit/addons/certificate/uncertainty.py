@@ -37,12 +37,6 @@ def combined_standard_uncertainty(components: Sequence[UncertaintyComponent]) ->
     return math.sqrt(sum(component.standard**2 for component in components))
 
 
-def effective_degrees_of_freedom(components: Sequence[UncertaintyComponent]) -> float:
-    """Return the effective degrees of freedom by the Welch-Satterthwaite formula (GUM G.4.1, equation G.2b)."""
-    spread = sum(component.standard**4 / component.degrees for component in components)
-    return combined_standard_uncertainty(components) ** 4 / spread if spread > 0 else math.inf
-
-
 def symmetric_interval(draws: Vector, probability: float) -> tuple[float, float]:
     """Return the ends of the probabilistically symmetric coverage interval (JCGM 101, 7.7)."""
     low, high = (float(end) for end in np.quantile(draws, ((1 - probability) / 2, (1 + probability) / 2)))

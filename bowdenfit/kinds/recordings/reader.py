@@ -266,7 +266,7 @@ def _read_entry(source: Source, path: Path, entry: RecordingFile, files_of_all: 
         return _read_file(source, path, entry, files_of_all)
     except BowdenfitError as error:
         described = enumerate(source.description.recording)
-        numbers = [i for i, one in described if (one.file, one.where) == (entry.file, entry.where)]
+        numbers = [i for i, part in described if (part.file, part.where) == (entry.file, entry.where)]
         if not path.exists():
             error.key_path = ("file" if numbers else "files",)
         key, *names = error.key_path or ("",)

@@ -6,8 +6,6 @@ Where a curve does not follow the wrap angles, the other curve families are trie
 import shlex
 from collections.abc import Sequence
 
-import jax
-import numpy as np
 from scipy.special import bdtrc
 
 from bowdenfit.cable.registry import CURVES
@@ -15,18 +13,14 @@ from bowdenfit.cable.sensors import DELAY_ERROR
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.lack_of_fit import FALSE_ALARM, Departure
-from bowdenfit.inference.least_squares import fit_least_squares
-from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.sliding_rows import OFFSET, ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
-from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
-from bowdenfit.questions.check.remedies import describe_remedies
+from bowdenfit.questions.check.remedies import describe_remedies, fit_anew
 from bowdenfit.questions.recorded.causes_of_departures import describe_creep, describe_slow_noise
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, shown, significant
@@ -312,10 +306,6 @@ def curve_family_fits(dataset: Dataset, number: int, family: str) -> bool:
     contacts[number] = contacts[number].model_copy(update={"wrap_angle": angle.model_copy(update={"curve": family})})
     changed = description.model_copy(update={"contact": tuple(contacts)})
     table = dataset.measurements.table(AngleTable)
-    with jax.enable_x64(True):
-        posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
-        fit = fit_least_squares(
-            posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False
-        )
-    departures = [departure for departure in fit.departures if departure.group == angle.column]
+    solved, _ = fit_anew(Dataset(changed, Measurements((table,) if table else (), ()), {}))
+    departures = [departure for departure in solved.departures if departure.group == angle.column]
     return bool(departures) and all(departure.p_value >= FALSE_ALARM for departure in departures)

@@ -11,13 +11,14 @@ import jax
 import numpy as np
 
 from bowdenfit.cable.conditions import Conditions
+from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.description.values import QuantityValue
 from bowdenfit.errors import DescriptionError
-from bowdenfit.inference.least_squares import fit_least_squares
+from bowdenfit.inference.least_squares import LeastSquares, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.models import build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import significant
 
@@ -87,19 +88,27 @@ def _trials(description: Description, conditions: Conditions) -> Iterator[_Trial
             yield _Trial(words, f"--friction {more}", description.model_copy(update={"friction_model": more}))
 
 
+def fit_anew(dataset: Dataset) -> tuple[LeastSquares, Model]:
+    """Return least squares of a data set without intervals, and its model.
+
+    Raises:
+        DescriptionError: The readings lack what the model needs.
+    """
+    with jax.enable_x64(True):
+        posterior = LogDensity(build_model(dataset))
+        start = np.zeros(posterior.model.space.size)
+        return fit_least_squares(posterior, make_objective(posterior), start, intervals=False), posterior.model
+
+
 def _try(fit: Record, description: Description) -> str:
     """Return the coefficients of friction, and what the fit did not have, such as 'mu 0.119, output_offset 3.6 N'.
 
     Empty where residuals depart from the model still, or where the readings do not determine what is new.
     """
     try:
-        model = build_model(replace(fit.dataset, description=description))
+        solved, model = fit_anew(replace(fit.dataset, description=description))
     except DescriptionError:  # the readings lack what it needs, such as speeds
         return ""
-    with jax.enable_x64(True):
-        posterior = LogDensity(model)
-        start = np.zeros(model.space.size)
-        solved = fit_least_squares(posterior, make_objective(posterior), start, intervals=False)
     present = {p.name for p in fit.model.space.parameters}
     determined = {name: estimate for name, estimate in solved.estimates.items() if estimate.identified}
     clear = [abs(e.value) > _CLEAR * e.standard_error for name, e in determined.items() if name not in present]

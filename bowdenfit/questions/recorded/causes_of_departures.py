@@ -4,7 +4,7 @@ from bowdenfit.inference.lack_of_fit import Departure
 from bowdenfit.kinds.recordings.blocks import RECORDED
 from bowdenfit.recordings.bench_faults import shows_creep
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import significant
 
 _SLOW_NOISE = 0.07  # judged: slow noise over the force, from which it changes losses by percents
@@ -12,15 +12,20 @@ _SLOW_NOISE = 0.07  # judged: slow noise over the force, from which it changes l
 
 def describe_creep(fit: Record, departure: Departure) -> str:
     """Describe a rope that creeps in recordings whose model lets friction hold at once; empty where none does."""
-    recordings = fit.dataset.measurements.table(Recordings)
-    if recordings is None or recordings.loop or not _is_inside_recordings(departure) or fit.model.cable.friction.counts_turns:
-        return ""
-    if not any(shows_creep(recording) for recording in recordings.items):
+    if not _is_inside_recordings(departure) or not _shows_creep(fit):
         return ""
     return (
         "After its reversals the rope creeps: its friction builds up while the output moves already, and readings from before "
         "it is there lose less. Fit again with --friction dahl."
     )
+
+
+@cached_per_fit
+def _shows_creep(fit: Record) -> bool:
+    recordings = fit.dataset.measurements.table(Recordings)
+    if recordings is None or recordings.loop or fit.model.cable.friction.counts_turns:
+        return False
+    return any(shows_creep(recording) for recording in recordings.items)
 
 
 def describe_slow_noise(fit: Record, departure: Departure) -> str:

@@ -10,9 +10,8 @@ from bowdenfit.addons.certificate.answer import CertifiedQuantity
 from bowdenfit.addons.certificate.uncertainty import (
     UncertaintyComponent,
     combined_standard_uncertainty,
-    effective_degrees_of_freedom,
 )
-from bowdenfit.inference.degrees_of_freedom import coverage_factor, fit_t_distribution
+from bowdenfit.inference.degrees_of_freedom import coverage_factor, effective_degrees_of_freedom, fit_t_distribution
 
 # JCGM 100:2008, table H.1 [nm]: the standard, the difference, and the differences of expansion and of temperature.
 END_GAUGE = (
@@ -26,7 +25,8 @@ GRID = (np.arange(200_000) + 0.5) / 200_000  # probabilities whose quantiles sta
 
 def test_the_end_gauge_of_the_gum_comes_out_to_its_printed_digits():
     """JCGM 100:2008, H.1: 50.000838 mm, u_c = 32 nm, 16 degrees of freedom, t_99 = 2.92, U = 93 nm."""
-    combined, degrees = combined_standard_uncertainty(END_GAUGE), effective_degrees_of_freedom(END_GAUGE)
+    combined = combined_standard_uncertainty(END_GAUGE)
+    degrees = effective_degrees_of_freedom([part.standard for part in END_GAUGE], [part.degrees for part in END_GAUGE])
     assert f"{combined:.0f}" == "32"
     assert math.floor(degrees) == 16  # H.1.6 rounds it down before it looks t up
     factor = coverage_factor(16, 0.99)
@@ -52,5 +52,5 @@ def test_tails_that_are_no_wider_than_normal_ones_have_infinitely_many_degrees()
     for law in (stats.norm(), stats.uniform(), stats.triang(0.5), stats.t(200)):
         assert fit_t_distribution(law.ppf(GRID))[1] == math.inf
     assert fit_t_distribution(stats.t(0.5).ppf(GRID))[1] == 1.0
-    assert effective_degrees_of_freedom((UncertaintyComponent("limits", "B", 2.0, math.inf),)) == math.inf
+    assert effective_degrees_of_freedom([2.0], [math.inf]) == math.inf
     assert coverage_factor(math.inf, 0.95) == pytest.approx(1.95996, abs=1e-5)

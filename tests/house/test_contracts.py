@@ -47,6 +47,7 @@ def test_layers_import_only_downward():
             "import bowdenfit.questions.figures",
             {"jax", "emcee", "scipy", "pint", "matplotlib"},
         ),
+        ("import bowdenfit.run.verb, bowdenfit.questions.summary, bowdenfit.questions.error_budget", {"scipy.optimize"}),
         ("import bowdenfit.inference.diagnostics, bowdenfit.results.netcdf", {"jax", "emcee", "matplotlib"}),
     ],
 )

@@ -22,6 +22,8 @@ INTERNAL_UNITS = {
     "velocity": "mm/s",
     "angular_velocity": "rad/s",
     "torque": "N*mm",
+    "current": "A",
+    "torque_constant": "N*mm/A",
     "ratio": "1",
     "inertia": "kg*m^2",
     "angular_damping": "N*m*s/rad",
@@ -37,6 +39,8 @@ _EXAMPLES = {
     "velocity": "mm/s, m/s",
     "angular_velocity": "r/min, rad/s, deg/s",
     "torque": "N*m, N*mm, lbf*inch",
+    "current": "A, mA",
+    "torque_constant": "N*m/A, mN*m/A",
     "ratio": "%, 1",
     "inertia": "kg*m^2, g*cm^2",
     "angular_damping": "N*m*s/rad, N*mm*s/rad",
@@ -74,7 +78,7 @@ _WEIGHTS = {"kg": "kgf", "g": "gf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "
 _PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm", "newton": "N", "newtons": "N",
                "sec": "s", "sek": "s", "msec": "ms"}  # fmt: skip
 # As engineers write torques without a sign between; to pint Nm is a number of yarn.
-_TORQUES = {"Nm": "N*m", "Nmm": "N*mm", "Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m"}
+_TORQUES = {"Nm": "N*m", "Nmm": "N*mm", "Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m", "Nm/A": "N*m/A", "mNm/A": "mN*m/A"}
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _UNIT_TEXT = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
 _MULTIPLE = re.compile(r"[x×*]? ?(?P<factor>10+) ?[x×*]? ?(?P<unit>[^\W\d].*)")  # (x10 N), (100 N)

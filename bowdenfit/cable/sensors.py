@@ -26,11 +26,37 @@ FORCE_NOISE = "sigma_F"
 BLOCK_NOISE = "sigma_block"
 DELAY_ERROR = "delay_error"
 INPUT_OFFSET, OUTPUT_OFFSET = "input_offset", "output_offset"
+GEAR_LOSS, GEAR_FRICTION = "gear_loss", "gear_friction"
+
+
+@dataclass(frozen=True)
+class Gear:
+    r"""Gear between the motor, whose current was read, and the rope.
+
+    Args:
+        loss: Share of the torque that it loses, 1 - eta [1].
+        friction: Its friction at the rope, T_g / r [N].
+    """
+
+    loss: Array | float
+    friction: Array | float
+
+    def rope_force(
+        self, motor_force: Float[Array, "*batch"], stroke: Float[Array, "*batch"] | float
+    ) -> Float[Array, "*batch"]:
+        """Return the force on the rope [N] where the motor makes a force while it pulls (1), returns (-1) or neither (0)."""
+        return motor_force * jnp.exp(stroke * jnp.log1p(-self.loss)) - stroke * self.friction
+
+    def motor_force(
+        self, rope_force: Float[Array, "*batch"], stroke: Float[Array, "*batch"] | float
+    ) -> Float[Array, "*batch"]:
+        """Return the force that the motor makes [N], inverse to `rope_force`."""
+        return (rope_force + stroke * self.friction) * jnp.exp(-stroke * jnp.log1p(-self.loss))
 
 
 @dataclass(frozen=True)
 class LoadCells:
-    r"""Systematic errors of the load cells, 0 where nothing is said of them.
+    r"""Systematic errors of the load cells, 0 where nothing is said of them; and a motor's gear in the place of the input's.
 
     .. math:: F_\text{in} = F_\text{in,shown} - b_\text{in}, \quad
               F_\text{out} = (F_\text{out,shown} - b_\text{out}) e^\gamma
@@ -40,30 +66,38 @@ class LoadCells:
         output_offset: b_out [N].
         gain_error: gamma, relative gain error between the two [1].
         delay_error: By how much the output still comes later than it was shifted back by: its delay, less the estimate [s].
+        gear: The gear of a motor that was read at the input; None of a load cell.
     """
 
     input_offset: Array | float
     output_offset: Array | float
     gain_error: Array | float
     delay_error: Array | float
+    gear: Gear | None = None
 
     @classmethod
     def of(cls, values: Mapping[str, Array]) -> "LoadCells":
         """Return the load cells at given parameters."""
-        names = (INPUT_OFFSET, OUTPUT_OFFSET, GAIN_ERROR, DELAY_ERROR)
-        return cls(*(values.get(name, 0.0) for name in names))
+        offsets = values.get(INPUT_OFFSET, 0.0), values.get(OUTPUT_OFFSET, 0.0)
+        gear = Gear(values[GEAR_LOSS], values[GEAR_FRICTION]) if GEAR_LOSS in values else None
+        return cls(*offsets, values.get(GAIN_ERROR, 0.0), values.get(DELAY_ERROR, 0.0), gear)
 
-    def true_input(self, shown: Float[Array, "*batch"], least: float = -jnp.inf) -> Float[Array, "*batch"]:
-        """Return the force at the input [N] where its cell shows a force, at least `least`."""
-        return _at_least(shown - self.input_offset, least)
+    def true_input(
+        self, shown: Float[Array, "*batch"], least: float = -jnp.inf, stroke: Float[Array, "*batch"] | float = 0.0
+    ) -> Float[Array, "*batch"]:
+        """Return the force at the input [N] where its cell, or its motor during a stroke, shows a force, at least `least`."""
+        force = shown - self.input_offset
+        return _at_least(force if self.gear is None else self.gear.rope_force(force, stroke), least)
 
     def true_output(self, shown: Float[Array, "*batch"], least: float = -jnp.inf) -> Float[Array, "*batch"]:
         """Return the force at the output [N] where its cell shows a force; its offset leaves at least `least` of that."""
         return _at_least(shown - self.output_offset, least) * jnp.exp(self.gain_error)
 
-    def shown_input(self, force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Return what the input's cell shows of a force [N]."""
-        return force + self.input_offset
+    def shown_input(
+        self, force: Float[Array, "*batch"], stroke: Float[Array, "*batch"] | float = 0.0
+    ) -> Float[Array, "*batch"]:
+        """Return what the input's cell, or its motor during a stroke, shows of a force [N]."""
+        return (force if self.gear is None else self.gear.motor_force(force, stroke)) + self.input_offset
 
     def shown_output(self, force: Float[Array, "*batch"], least: float = -jnp.inf) -> Float[Array, "*batch"]:
         """Return what the output's cell shows of a force [N], at least `least`."""

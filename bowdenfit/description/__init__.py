@@ -1,11 +1,12 @@
 """The description of a cable, `cable.toml`, as frozen models; the only place where defaults are written."""
 
 from collections.abc import Iterator
+from math import hypot, sqrt
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from bowdenfit.description.cable_parts import CableSettings, ContactSettings, Route, WrapAngle
+from bowdenfit.description.cable_parts import CableSettings, ContactSettings, Motor, Pulleys, Route, WrapAngle
 from bowdenfit.description.defaults import BenchErrors, PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.measurements import (
     MOST_FILES,
@@ -58,6 +59,7 @@ __all__ = [
     "HalfNormalPrior",
     "LogNormalPrior",
     "Measured",
+    "Motor",
     "Noise",
     "NonNegative",
     "NormalPrior",
@@ -91,6 +93,7 @@ RESERVED_NAMES = ("chain", "draw", "optimal_length", "optimal_efficiency")
 
 _MOST_CONTACTS = 100  # judged: on-body cables have three; equal ones can be joined, because their wrap angles add up
 _DEPARTURE = {"continuous": "smooth", "published": "none"}  # of angles from their curves, where nothing is stated, by geometry
+_OF_LOAD_CELLS = ("efficiencies", "displacement", "loop")  # tables whose input no motor's current can be
 _MOST_SETTINGS = 1000  # judged: more than one for each coefficient of each group
 AnySettings = TypeVar("AnySettings")
 
@@ -110,6 +113,7 @@ class Description(Display, Frozen):
     reference_force: QuantityValue | None = None
     reference_velocity: QuantityValue | None = None
     cable: CableSettings = CableSettings()
+    motor: Motor | None = None
     route: Route | None = None
     contact: Annotated[tuple[ContactSettings, ...], Field(min_length=1, max_length=_MOST_CONTACTS)]
     friction: dict[str, FrictionSetting] = Field(default_factory=dict, max_length=_MOST_SETTINGS)
@@ -189,11 +193,52 @@ class Description(Display, Frozen):
             )
         if self.cable.kind == "loop" and self.friction_model != "capstan":
             yield 'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'
+        if self.motor is not None:
+            yield from self._motor_conflicts()
+
+    def _motor_conflicts(self) -> Iterator[str]:
+        """Yield what contradicts a motor in the place of a load cell."""
+        if self.cable.input_pulley_radius is None:
+            yield '[motor] needs the radius of its pulley: [cable] input_pulley_radius = { value = 15, unit = "mm" }'
+        if self.cable.kind == "loop":
+            yield "[motor] is that of a single rope; a loop needs the torque at its input: write input_torque, without [motor]"
+        if of_turns := sorted({"play", "dahl", "lugre"} & set(self.friction_model.split("+"))):
+            yield (
+                f'friction_model = "{of_turns[0]}" is of the turns of the motion, in which a gear has friction of its own; '
+                "leave it out, or read a load cell at the input"
+            )
+        if others := [name for name in self.tables.stated if name in _OF_LOAD_CELLS]:
+            yield f"[motor] belongs to the tables forces and recordings; fit {listed(others)} in a data set without it"
 
     @property
     def fits_offsets(self) -> bool:
         """Whether the load cells' offsets are parameters."""
         return self.sensors.offset_sd is not None or any(settings.fits_offsets for settings in self.tables.stated.values())
+
+    @property
+    def shifts_forces(self) -> bool:
+        """Whether forces at both ends need not be in proportion: offsets, or the friction of a gear, are in the fit."""
+        return self.fits_offsets or self.motor is not None
+
+    @property
+    def gain_sd(self) -> float | None:
+        """Standard deviation of the log ratio of both ends' gains [1]; None where nothing is said of either.
+
+        That of a motor is the error of its constants; a load cell of which nothing is said then has the usual one.
+        """
+        if self.motor is None:
+            return self.sensors.gain_sd
+        radius = self.cable.input_pulley_radius
+        of_radius = radius.sd / radius.value if radius is not None and radius.sd is not None else 0.0
+        of_cells = self.errors.gain / sqrt(3) if self.sensors.gain_sd is None else self.sensors.gain_sd
+        return hypot(of_cells, of_radius, *self.motor.relative_sds)
+
+    @property
+    def pulleys(self) -> Pulleys:
+        """What turns torques and currents into forces."""
+        stated = self.cable.input_pulley_radius, self.cable.output_pulley_radius
+        of_input, of_output = (None if radius is None else radius.to("length") for radius in stated)
+        return Pulleys(of_input, of_output, self.motor)
 
     @property
     def by_group(self) -> bool:

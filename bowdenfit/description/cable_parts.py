@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from bowdenfit.description.values import Choice, Finite, Frozen, Name, NonNegative, Positive, QuantityValue
 from bowdenfit.errors import DatasetError
@@ -143,27 +143,103 @@ def radius_setting(end: str) -> str:
     return f'cable.{end}_pulley_radius={{value=15,unit="mm"}}'
 
 
+def _with_unit(unit: str) -> BeforeValidator:
+    """Return what reads a plain number as a quantity in a unit."""
+    return BeforeValidator(lambda stated: {"value": stated, "unit": unit} if isinstance(stated, int | float) else stated)
+
+
+class Motor(Frozen):
+    r"""A motor with a gear, whose current or torque was recorded in the place of a load cell at the input.
+
+    .. math:: F_\text{in} = \frac{\eta N K_t I - T_g}{r} \text{ pulling}, \quad
+              F_\text{in} = \frac{N K_t I / \eta + T_g}{r} \text{ returning}
+
+    with the torque constant K_t, the gear ratio N, the efficiency eta and the friction T_g of the gear at its output, and the
+    radius r of the pulley. What is stated of the efficiency or the friction is exact without `sd`; what is left out is learned.
+    """
+
+    torque_constant: QuantityValue | None = None
+    gear_ratio: Annotated[QuantityValue, _with_unit("1")] = QuantityValue(value=1, unit="1")
+    gear_efficiency: Annotated[QuantityValue | None, _with_unit("1")] = None
+    gear_friction: QuantityValue | None = None
+
+    @model_validator(mode="after")
+    def _possible(self) -> "Motor":
+        for name in ("torque_constant", "gear_ratio"):
+            stated = getattr(self, name)
+            if stated is not None and stated.value <= 0:
+                raise ValueError(f"{name} = {stated.value:g} must be more than 0")
+        if self.gear_efficiency is not None and not 0 < self.gear_efficiency.value <= 1:
+            raise ValueError(
+                f"gear_efficiency = {self.gear_efficiency.value:g} must be above 0 and at most 1, the share of the torque that "
+                "passes through the gear; write 0.8 for 80 %"
+            )
+        if self.gear_friction is not None and self.gear_friction.value < 0:
+            raise ValueError(f"gear_friction = {self.gear_friction.value:g}, a torque at the gear's output, must be 0 or more")
+        return self
+
+    @property
+    def relative_sds(self) -> tuple[float, ...]:
+        """Relative standard deviations of the factors from a current to a torque [1]."""
+        factors = (self.torque_constant, self.gear_ratio)
+        return tuple(factor.sd / factor.value for factor in factors if factor is not None and factor.sd is not None)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether its gear is stated without any doubt."""
+        return all(part is not None and part.sd is None for part in (self.gear_efficiency, self.gear_friction))
+
+
 @dataclass(frozen=True)
 class Pulleys:
-    """Radii of the pulleys at the motor and at the load side [mm]; None if not stated."""
+    """Radii of the pulleys at the motor and at the load side [mm], None if not stated; and a motor in place of a load cell."""
 
     input_radius: float | None = None
     output_radius: float | None = None
+    motor: Motor | None = None
 
-    def forces(self, torques: np.ndarray, end: str, file: str) -> np.ndarray:
-        """Return forces [N] from torques [N mm] at one end, "input" or "output", of a file.
+    def forces(self, values: np.ndarray, quantity: str, file: str) -> np.ndarray:
+        """Return forces on the rope [N] from torques [N mm] or currents [A]; those of a motor as if its gear lost nothing.
+
+        Args:
+            values: The readings.
+            quantity: "input_torque", "output_torque" or "input_current".
+            file: File that they were read from.
 
         Raises:
-            DatasetError: The radius of that pulley is not known.
+            DatasetError: The radius of that pulley is not known; or that of a current's motor.
         """
+        end, _, what = quantity.partition("_")
         radius = self.input_radius if end == "input" else self.output_radius
+        constant = self.motor.torque_constant if self.motor is not None else None
+        if what == "current" and constant is None:
+            raise DatasetError(
+                f"{file} gives {quantity}, but nothing says what torque a current makes; add the motor to cable.toml, with its "
+                'own numbers: [motor] torque_constant = { value = 0.05, unit = "N*m/A", sd = 0.002 }, with gear_ratio, '
+                f"gear_efficiency and gear_friction if it has a gear, and [cable] {end}_pulley_radius."
+            )
         if radius is None:
             raise DatasetError(
-                f"{file} gives {end}_torque, but the radius of that pulley is not known; add it to cable.toml: [cable] "
+                f"{file} gives {quantity}, but the radius of that pulley is not known; add it to cable.toml: [cable] "
                 f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}; or for a file by itself, '
                 f"--set '{radius_setting(end)}'."
             )
-        return torques / radius
+        factor = constant.to("torque_constant") if constant is not None and what == "current" else 1.0
+        if end == "input" and self.motor is not None:
+            factor *= self.motor.gear_ratio.to("ratio")
+        return values * factor / radius
+
+    def check_input_force(self, file: str) -> None:
+        """Refuse an input force that was read where a motor is described, which stands in its place.
+
+        Raises:
+            DatasetError: There is a motor.
+        """
+        if self.motor is not None:
+            raise DatasetError(
+                f"{file} gives input_force, the reading of a load cell, and cable.toml has a [motor], which takes the place of "
+                "one; name the column input_current or input_torque if it holds that, else delete [motor]."
+            )
 
 
 class CableSettings(Frozen):
@@ -175,12 +251,6 @@ class CableSettings(Frozen):
     rope_diameter: QuantityValue | None = None
     bend_radius: QuantityValue | None = None
     backlash: QuantityValue | None = None
-
-    @property
-    def pulleys(self) -> Pulleys:
-        """Radii of the pulleys in mm."""
-        stated = self.input_pulley_radius, self.output_pulley_radius
-        return Pulleys(*(None if radius is None else radius.to("length") for radius in stated))
 
     @property
     def lengths(self) -> dict[str, QuantityValue | None]:

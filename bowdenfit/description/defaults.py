@@ -176,6 +176,7 @@ class PriorDefaults(Frozen):
     preload_noise_share: Positive = 0.05
     offset_share: Positive = 0.025
     drag_share: Positive = 0.05
+    largest_gear_loss: Positive = 0.8
     wobble_degrees: Positive = 30.0
     wobble_per_m: Positive = 0.1
     stribeck: Positive = 0.3

@@ -22,6 +22,13 @@ from bowdenfit.words import shown
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
 
+_OF_MOTORS = {
+    "torque_constant": "torque_constant",
+    "gear_ratio": "ratio",
+    "gear_efficiency": "ratio",
+    "gear_friction": "torque",
+}
+
 PLACEHOLDERS = {
     "NAME OF THE CABLE": "what the cable is called",
     "WHO MEASURED IT, WHEN, ON WHICH BENCH": "where the numbers come from, or delete the line",
@@ -117,7 +124,7 @@ def _check_route(route: Route | None, file: str) -> None:
 
 def _quantities(description: Description) -> list[Stated]:
     """Quantities of the description but for its tables."""
-    cable, preload, sensors = description.cable, description.preload, description.sensors
+    cable, preload, sensors, motor = description.cable, description.preload, description.sensors, description.motor
     return [
         *((f"contact {c.name!r}, wrap_angle", c.wrap_angle.constant, "angle") for c in description.contact),
         *((f"contact {c.name!r}, nominal", c.wrap_angle.nominal, "angle") for c in description.contact),
@@ -131,6 +138,11 @@ def _quantities(description: Description) -> list[Stated]:
         *((f"cable, {name}", length, "length") for name, length in cable.lengths.items()),
         ("preload, wrap_angle", preload.wrap_angle, "angle"),
         ("preload, value", preload.value, "force"),
+        *(
+            (f"motor, {name}", getattr(motor, name), dimension)
+            for name, dimension in _OF_MOTORS.items()
+            if motor is not None
+        ),
     ]
 
 

@@ -109,7 +109,7 @@ def iterate_error_sources(description: Description) -> Iterator[ErrorSource]:
     Between limits of +-a every value is as likely (GUM 4.3.7), which makes a standard uncertainty of a/sqrt(3); two load cells
     have errors of their own.
     """
-    limits, sensors = description.errors, description.sensors
+    limits = description.errors
     angles = {
         f"{limits.angle.value:g} {limits.angle.unit}": (BenchError(angle_offset=STEP), limits.angle.to("angle")),
         f"{100 * limits.angle_scale:g} %": (BenchError(angle_scale=STEP), limits.angle_scale),
@@ -118,7 +118,7 @@ def iterate_error_sources(description: Description) -> Iterator[ErrorSource]:
     if known_to:
         yield ErrorSource("wrap angles", f"wrap angles known to {' and '.join(known_to)}", dict(known_to.values()))
     of_both_cells = sqrt(2 / 3) / STEP
-    if limits.gain and sensors.gain_sd is None:
+    if limits.gain and description.gain_sd is None:
         words = f"a gain of each load cell known to {100 * limits.gain:g} %"
         yield ErrorSource("gain", words, {BenchError(gain=STEP): limits.gain * of_both_cells}, 2)
     if limits.hysteresis:

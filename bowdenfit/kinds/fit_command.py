@@ -170,6 +170,8 @@ def _name_forces(
     ends = {name: columns[candidates[0].position] for name, candidates in can_be.items() if candidates}
     sure = {name for name, candidates in can_be.items() if len(candidates) == 1}
     unnamed = [quantity.name for quantity in FORCES if quantity.name not in named]
+    if "input_force" in unnamed and "input_force" not in ends and (current := _find_current(columns)) is not None:
+        ends["input_force"] = current
     missing = [name for name in unnamed if name not in ends]
     remaining = _forces_among([column for column in columns if column not in ends.values()], len(missing))
     best = remaining[: len(missing)]
@@ -193,11 +195,22 @@ def _name_forces(
             end = name.removesuffix("_force")
             options += [(option, _naming(f"{end}_torque", ends[name].name)), ("--set", radius_setting(end))]
             provided.append(f"{shown(ends[name].name)} is the torque of a pulley of 15 mm at the {end}")
+        elif measures(ends[name].written_unit, "current"):
+            settings = 'motor.torque_constant={value=0.05,unit="N*m/A"}', radius_setting("input")
+            options += [(option, _naming("input_current", ends[name].name)), *(("--set", setting) for setting in settings)]
+            provided.append(f"{shown(ends[name].name)} is the current of a motor of 0.05 N m/A with a pulley of 15 mm")
         elif always or unit or name not in sure:
             options.append((option, _naming(name, ends[name].name, unit)))
     if any(not column.written_unit for name, column in ends.items() if name not in multiples):
         provided.append("the forces are in newtons, as the file does not state")
     return options, provided, [name for name in missing if name not in ends]
+
+
+def _find_current(columns: Sequence[FileColumn]) -> FileColumn | None:
+    """Return the column of a motor's current where no two columns can be forces; None otherwise."""
+    currents = [column for column in columns if measures(column.written_unit, "current")]
+    others = [column for column in columns if column not in currents]
+    return currents[0] if currents and len(_forces_among(others, len(FORCES))) < len(FORCES) else None
 
 
 def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]:

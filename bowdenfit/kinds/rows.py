@@ -22,7 +22,10 @@ from bowdenfit.words import shown, significant
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)  # five and a half turns; more is a mistaken unit. A judgement
 _ALIKE = 0.75  # difflib's likeness from which an unknown heading is taken for a misspelled one; a judgement
-ENDS = tuple(Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque"))
+ENDS = (
+    *(Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque")),
+    Quantity("input_current", "current"),
+)
 FileRows = tuple[list[str], list[list[str]]]
 """Headings and rows."""
 _DIGITS = 5  # significant digits of the largest value of a written column; a judgement
@@ -277,7 +280,7 @@ def check_spelling(table: RawTable, columns: Mapping[str, Column], optional: Seq
 
 
 def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
-    """Return the column of one end, "input" or "output".
+    """Return the column of one end, "input" or "output": of its force, or of a torque or a current instead.
 
     Args:
         table, columns: Where it is looked for.
@@ -285,13 +288,14 @@ def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *,
         is_loop: Whether torques are as usual as forces, so that both are named where there are none.
 
     Raises:
-        DatasetError: There is none of forces and none of torques, or one of each.
+        DatasetError: There is none, or there are several.
     """
-    force, torque = f"{end}_force", f"{end}_torque"
-    if force in columns and torque in columns:
-        raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
-    named = f"{force}_N or {torque}_N_m" if is_loop else f"{force}_N"
-    return columns[torque] if torque in columns else require_column(table, columns, force, named)
+    force, others = f"{end}_force", [name for name in _other_readings(end) if name in columns]
+    several = [name for name in (force, *others) if name in columns]
+    if len(several) > 1:
+        raise DatasetError(f"{table.file} has both {several[0]} and {several[1]}; leave one of the two columns out.")
+    named = f"{force}_N or {end}_torque_N_m" if is_loop else f"{force}_N"
+    return columns[others[0]] if others else require_column(table, columns, force, named)
 
 
 def convert_to_forces(
@@ -300,17 +304,24 @@ def convert_to_forces(
     """Return the forces on the rope at one end [N], from what its column holds.
 
     Args:
-        values: Numbers of `find_end_column`, in N or N mm.
+        values: Numbers of `find_end_column`, in N, N mm or A.
         table, columns: Where they were read.
         end: "input" or "output".
-        description: Radii of the pulleys, and the ratio of the force on the rope to the reading of its cell.
+        description: Radii of the pulleys, the motor, and the ratio of the force on the rope to the reading of its cell.
 
     Raises:
-        DatasetError: They are torques, and the radius of that pulley is not stated.
+        DatasetError: They are torques or currents, and the radius of that pulley, or the motor, is not stated.
     """
-    is_torque = f"{end}_torque" in columns
-    forces = description.cable.pulleys.forces(values, end, table.file) if is_torque else values
+    quantity = next((name for name in _other_readings(end) if name in columns), None)
+    if quantity is None and end == "input":
+        description.pulleys.check_input_force(table.file)
+    forces = values if quantity is None else description.pulleys.forces(values, quantity, table.file)
     return forces * description.sensors.ratio(end)
+
+
+def _other_readings(end: str) -> tuple[str, ...]:
+    """Return what may be read at an end, "input" or "output", in the place of its force."""
+    return tuple(quantity.name for quantity in ENDS if quantity.name.startswith(end) and not quantity.name.endswith("force"))
 
 
 def route_heading(description: Description) -> list[str]:
@@ -352,10 +363,11 @@ def convert_excluded(reading: ExcludedReading, description: Description) -> Excl
     """Return a reading that the user leaves out with the forces on the rope, as `convert_to_forces` gives those of others."""
     values = dict(reading.values)
     for end in ("input", "output"):
-        force, torque = f"{end}_force", f"{end}_torque"
+        force, others = f"{end}_force", [name for name in _other_readings(end) if name in values]
         with suppress(DatasetError):
-            if torque in values and force not in values:
-                values[force] = float(description.cable.pulleys.forces(np.array([values[torque]]), end, reading.file)[0])
+            if others and force not in values:
+                reading_at_end = np.array([values[others[0]]])
+                values[force] = float(description.pulleys.forces(reading_at_end, others[0], reading.file)[0])
         if force in values:
             values[force] *= description.sensors.ratio(end)
     return replace(reading, values=values)

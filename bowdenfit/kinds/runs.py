@@ -22,6 +22,7 @@ _WEIGHTS = ("weight", "load_squares", "load_products", "drift_squares", "drift_p
 # Cells of each stroke of a run where load, speed or a delay matters. Judgements: few suffice, because what varies inside a cell
 # enters to first order (`RunsTerm._deviations`).
 _LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8
+_GEAR_BINS = 96  # where the friction of a gear takes most of a small load, so that the loss bends inside a cell. A judgement
 _ALIKE = 0.05  # relative difference of speeds that count as one; a judgement
 _FEWEST = 6  # single-reading runs from which their scatter is split: two parameters and some freedom. A judgement
 _LEAST_SHARE = 1e-3  # end of the grid of noise variance over that of mountings, at which one of them is as good as 0
@@ -155,7 +156,7 @@ class RunsTerm:
     @property
     def depends_on_conditions(self) -> bool:
         """See `Term`: the capstan equation without offsets knows ratios of forces alone."""
-        return bool(self.cable.friction.options) or self.cable.description.fits_offsets
+        return bool(self.cable.friction.options) or self.cable.description.shifts_forces
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
@@ -198,14 +199,15 @@ class RunsTerm:
         """Return the log ratio that the load cells show, and its derivatives by friction exponent and log load."""
         friction, stroke, cells = self.cable.friction, data.stroke, LoadCells.of(values)
         from_delay = cells.late(data.drift)
-        if not (friction.depends_on_load or friction.depends_on_stroke or OUTPUT_OFFSET in values):
+        is_shift = not (friction.depends_on_load or friction.depends_on_stroke or OUTPUT_OFFSET in values)
+        if is_shift and cells.gear is None:
             return exponent + stroke * cells.gain_error + from_delay, jnp.ones_like(exponent), jnp.zeros_like(exponent)
 
         least = friction.conditions.least_force
 
         def ratio(more: Array, load: Array) -> Array:
             read = data.input_force * jnp.exp(load)
-            input_force = cells.true_input(read, least)
+            input_force = cells.true_input(read, least, stroke)
             output_force = friction.output_force(values, input_force, exponent + more, stroke)
             return stroke * jnp.log(read / cells.shown_output(output_force, least))
 
@@ -392,9 +394,9 @@ def _assign_cells(cable: CableContacts, rows: SlidingRows) -> tuple[np.ndarray, 
     keys = [rows.run, rows.stroke, *jax.tree.leaves(rows.angles)]
     if cable.friction.depends_on_rate:
         keys.append(_bin_values(_round_speeds(rows.velocity), rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
-    on_load = cable.friction.depends_on_load or cable.description.fits_offsets
+    on_load = cable.friction.depends_on_load or cable.description.shifts_forces
     if on_load or np.any(rows.drift):
-        bins = _LOAD_BINS if on_load else _DELAY_BINS
+        bins = _GEAR_BINS if cable.description.motor else _LOAD_BINS if on_load else _DELAY_BINS
         keys.append(_bin_values(rows.input_force + rows.output_force, rows.run * 2 + (rows.stroke > 0), bins))
     design = np.column_stack([np.nan_to_num(key) for key in keys])
     _, first, cell = np.unique(design, axis=0, return_index=True, return_inverse=True)

@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from bowdenfit.cable.elasticity import RopeScales, preload_parameter, rope_parameters
-from bowdenfit.cable.sensors import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.sensors import (
+    FORCE_NOISE,
+    GAIN_ERROR,
+    GEAR_FRICTION,
+    GEAR_LOSS,
+    INPUT_OFFSET,
+    OUTPUT_OFFSET,
+    RUN_SCATTER,
+)
 from bowdenfit.description import Description
 from bowdenfit.kinds.tables import LoopTable, PreloadTable, StretchTable
 from bowdenfit.kinds.term import Circumstances
-from bowdenfit.parameters.priors import HalfCauchy, Normal, TruncatedNormal
+from bowdenfit.parameters.priors import HalfCauchy, Normal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, Scale
 
 
@@ -52,12 +60,43 @@ def declare_offsets(at: Circumstances) -> list[Parameter]:
     ]  # fmt: skip
 
 
+def declare_gear(at: Circumstances) -> list[Parameter]:
+    """Return loss and friction of the gear of a motor that was read in the place of the input's load cell."""
+    motor, radius = at.description.motor, at.description.pulleys.input_radius
+    if motor is None or radius is None:
+        return []
+    load, share, shown = at.cable.friction.conditions.load, at.defaults.drag_share, radius / 1000
+    loss = Parameter(
+        GEAR_LOSS, r"$1-\eta$", "share of the torque that the gear of the motor loses", "sensor",
+        Uniform(0.0, at.defaults.largest_gear_loss),
+    )  # fmt: skip
+    friction = Parameter(
+        GEAR_FRICTION, "$T_g$", "friction of the gear of the motor, at its output", "sensor",
+        HalfCauchy(share * load.value), "N*m", shown, scaled_by=load.describe_share(share),
+    )  # fmt: skip
+    efficiency, torque = motor.gear_efficiency, motor.gear_friction
+    if efficiency is not None:
+        loss = _with_stated(loss, 1 - efficiency.to("ratio"), efficiency.sd_to("ratio"))
+    if torque is not None:
+        sd = torque.sd_to("torque")
+        friction = _with_stated(friction, torque.to("torque") / radius, None if sd is None else sd / radius)
+    return [loss, friction]
+
+
+def _with_stated(parameter: Parameter, value: float, sd: float | None) -> Parameter:
+    """Return a parameter that is not negative as it is stated: exact without a standard deviation."""
+    if sd is None:
+        return replace(parameter, fixed=value, prior_words="fixed (as stated)", scaled_by="")
+    return replace(parameter, prior=TruncatedNormal(value, sd), scaled_by="")
+
+
 def declare_gain_error(description: Description) -> list[Parameter]:
     """Return the relative gain error between the load cells, where the description says how large that of each may be."""
-    sd = description.sensors.gain_sd
+    sd = description.gain_sd
     if not sd:
         return []
-    meaning = "relative gain error between the two load cells"
+    ends = "the two load cells" if description.motor is None else "the motor and the load cell at the output"
+    meaning = f"relative gain error between {ends}"
     return [Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, sd))]
 
 

@@ -25,6 +25,8 @@ from bowdenfit.cable.sensors import (
     DELAY_ERROR,
     FORCE_NOISE,
     GAIN_ERROR,
+    GEAR_FRICTION,
+    GEAR_LOSS,
     INPUT_OFFSET,
     OUTPUT_OFFSET,
     RUN_SCATTER,
@@ -80,7 +82,7 @@ TERMS: dict[str, TermKind[Any]] = {kind.name: kind for kind in (*_ALL, *_collect
 _ORDER = (
     *(STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD, LENGTHENING, STRETCH_ZERO, STRETCH_FRICTION, REFERENCE_PRELOAD),
     *(LOOP_MOUNTING, ANGLE_NOISE, RUN_SCATTER, FORCE_NOISE, STATED_NOISE, BLOCK_NOISE, STRETCH_NOISE, PRELOAD_NOISE),
-    *(GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, DELAY_ERROR),
+    *(GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, DELAY_ERROR, GEAR_LOSS, GEAR_FRICTION),
 )  # in z, which what a seed draws depends on; those of other kinds come after these
 
 

@@ -12,16 +12,16 @@ from bowdenfit.files.clocks import YEARS, is_clock
 from bowdenfit.files.headings import find_candidates, heading_of, option_naming, rank_headings, unit_to_state
 from bowdenfit.files.pieces import have_same_numbers
 from bowdenfit.recordings.named_channels import (
+    INSTEAD_OF_FORCES,
     OUTPUT_CLOCK,
     RATE,
-    TORQUES,
     WANTED,
     converted,
     find_channel,
     stated_unit,
 )
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.units import INTERNAL_UNITS, ColumnSource, measures, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ColumnSource, measures, speed_dimension, usual_units
 from bowdenfit.words import quoted, shown
 
 _FORCES = ("input_force", "output_force")
@@ -50,8 +50,9 @@ def to_recording(
         name: Name of the recording.
         sources: Channels that the user has named, by quantity; the others are found by their names. The time may also
             be given as a rate, such as "1000 Hz"; a minus sign before a unit turns the sign.
-        pulleys: By whose radii channels of torques become forces.
-        is_loop: Whether the cable is a pull-pull loop; a single rope's channels are torques where they or the radius say so.
+        pulleys: By which channels of torques and currents become forces.
+        is_loop: Whether the cable is a pull-pull loop; a single rope's channels are torques or currents where they, the radius
+            or a motor say so.
         output_file: What was read of the file of a second logger, where that recorded the output force.
 
     Returns:
@@ -59,7 +60,7 @@ def to_recording(
 
     Raises:
         DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind; or the radius
-            of a torque's pulley is not stated.
+            of a torque's pulley, or the motor of a current, is not stated.
     """
     if output_file is not None:
         return _join_files(file, output_file, name, sources, pulleys, is_loop)
@@ -88,7 +89,7 @@ def to_recording(
             clocks.get("velocity", np.zeros(0)),
             velocity,
             is_loop,
-            channels=("", "") if channels.torques else (by_quantity["input_force"].name, by_quantity["output_force"].name),
+            channels=("", "") if channels.instead else (by_quantity["input_force"].name, by_quantity["output_force"].name),
         ),
         unit,
     )
@@ -122,23 +123,24 @@ def separate_joined_clocks(raw: RawRecording) -> tuple[RawRecording, tuple[str, 
 
 @dataclass(frozen=True)
 class _Channels:
-    """Channels of a file by what they are; torques stand under the force that they become.
+    """Channels of a file by what they are; torques and currents stand under the force that they become.
 
     Args:
         by_quantity: The channels.
-        torques: Which of them are torques.
+        instead: What was recorded in the place of a force, such as "input_torque", by the force.
     """
 
     by_quantity: dict[str, Channel]
-    torques: frozenset[str]
+    instead: Mapping[str, str]
 
 
 def _find_channels(
     file: ChannelFile, sources: Mapping[str, ColumnSource], pulleys: Pulleys, is_loop: bool
 ) -> _Channels:
     by_quantity = {q.name: channel for q in WANTED if (channel := find_channel(file, q, sources)) is not None}
-    torques = _torques(file, by_quantity, sources, pulleys, is_loop)
-    return _Channels(by_quantity | torques, frozenset(torques))
+    instead = _find_instead_of_forces(file, by_quantity, sources, pulleys, is_loop)
+    channels = {force: channel for force, (_, channel) in instead.items()}
+    return _Channels(by_quantity | channels, {force: quantity for force, (quantity, _) in instead.items()})
 
 
 def _read_force(
@@ -146,9 +148,11 @@ def _read_force(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return times [s] and forces [N] of one end."""
     channel = channels.by_quantity[quantity]
-    if quantity in channels.torques:
-        force = _from_torque(file, channel, quantity, sources, pulleys)
+    if quantity in channels.instead:
+        force = _convert_to_force(file, channel, channels.instead[quantity], sources, pulleys)
     else:
+        if quantity == "input_force":
+            pulleys.check_input_force(file.path.name)
         force = converted(file, channel, quantity, sources.get(quantity), "force")
     time = _clock(file, channel, channels.by_quantity.get("time"), sources.get("time"))
     _same_length(file, channel, force, time)
@@ -225,7 +229,7 @@ def _find_end(
     forces = [channel for channel in file.channels if _is_force(channel)]
     if len(forces) != 1:
         raise _missing(file, wanted)
-    return _Channels(by_quantity | {wanted: forces[0]}, channels.torques)
+    return _Channels(by_quantity | {wanted: forces[0]}, channels.instead)
 
 
 def _is_force(channel: Channel) -> bool:
@@ -241,41 +245,46 @@ def _refuse_output_clock(file: ChannelFile, sources: Mapping[str, ColumnSource])
         )
 
 
-def _torques(
+def _find_instead_of_forces(
     file: ChannelFile,
     by_quantity: Mapping[str, Channel],
     sources: Mapping[str, ColumnSource],
     pulleys: Pulleys,
     is_loop: bool,
-) -> dict[str, Channel]:
-    """Return channels of torque in the place of forces, by the force that each becomes."""
-    torques = {}
-    for quantity in TORQUES:
-        force = quantity.name.replace("torque", "force")
-        radius = pulleys.input_radius if force == "input_force" else pulleys.output_radius
-        expected = is_loop or radius is not None or quantity.name in sources
+) -> dict[str, tuple[str, Channel]]:
+    """Return what was recorded in the place of forces with its channel, by the force."""
+    instead = dict[str, tuple[str, Channel]]()
+    for quantity in INSTEAD_OF_FORCES:
+        end, _, what = quantity.name.partition("_")
+        force, radius = f"{end}_force", pulleys.input_radius if end == "input" else pulleys.output_radius
+        has_source = radius is not None and (what == "torque" or pulleys.motor is not None)
+        expected = (is_loop and what == "torque") or has_source or quantity.name in sources
         if not expected or (force in sources and quantity.name not in sources):
             continue
         channel = find_channel(file, quantity, sources)
         if channel is not None and force in by_quantity and (force in sources or quantity.name not in sources):
-            by_force, by_torque = by_quantity[force].name, channel.name
+            by_force, unit = by_quantity[force].name, usual_units(quantity.dimension)[0]
             raise DatasetError(
-                f"{file.path.name} has both {force} ({shown(by_force)}) and {quantity.name} ({shown(by_torque)}); say which is "
-                f"meant: {option_naming(force, by_force, 'N', '--channel')} or "
-                f"{option_naming(quantity.name, by_torque, 'N*m', '--channel')}."
+                f"{file.path.name} has both {force} ({shown(by_force)}) and {quantity.name} ({shown(channel.name)}); say which "
+                f"is meant: {option_naming(force, by_force, 'N', '--channel')} or "
+                f"{option_naming(quantity.name, channel.name, unit, '--channel')}."
+            )
+        if channel is not None and force in instead:
+            raise DatasetError(
+                f"{file.path.name} has both {instead[force][0]} ({shown(instead[force][1].name)}) and {quantity.name} "
+                f"({shown(channel.name)}); rename the channel that is not to be read."
             )
         if channel is not None:
-            torques[force] = channel
-    return torques
+            instead[force] = quantity.name, channel
+    return instead
 
 
-def _from_torque(
-    file: ChannelFile, channel: Channel, force: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys
+def _convert_to_force(
+    file: ChannelFile, channel: Channel, quantity: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys
 ) -> np.ndarray:
-    """Return forces [N] from the torques of a pulley and its radius."""
-    end = force.removesuffix("_force")
-    torques = converted(file, channel, f"{end}_torque", sources.get(f"{end}_torque"), "torque")
-    return pulleys.forces(torques, end, file.path.name)
+    """Return forces [N] from torques or currents, such as "input_torque"."""
+    values = converted(file, channel, quantity, sources.get(quantity), quantity.partition("_")[2])
+    return pulleys.forces(values, quantity, file.path.name)
 
 
 def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
@@ -313,8 +322,13 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
         return DatasetError(f"{has} {other}")
     name, below = headings[likely[0]]
     unit = unit_to_state(name, below, "N")
-    if measures(heading_of(name, below).unit, "torque"):
-        end = quantity.removesuffix("_force")
+    end, read_unit = quantity.removesuffix("_force"), heading_of(name, below).unit
+    if measures(read_unit, "current") and end == "input":
+        return DatasetError(
+            f"{has} If {shown(name)} is the current of the motor, name it and describe the [motor] with its torque_constant: "
+            f"{option_naming('input_current', name, '', '--channel')}. {other}"
+        )
+    if measures(read_unit, "torque"):
         return DatasetError(
             f"{has} If {shown(name)} is the torque of the pulley at the {end}, name it and state the radius: "
             f"{option_naming(f'{end}_torque', name, '', '--channel')} --set '{radius_setting(end)}'. {other}"

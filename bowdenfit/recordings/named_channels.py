@@ -23,7 +23,12 @@ WANTED = (
     Quantity("velocity", "speed"),
     Quantity("time", "time"),
 )
-TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of pulleys
+# What may be recorded in the place of a force: torques of pulleys, and the current of a motor.
+INSTEAD_OF_FORCES = (
+    Quantity("input_torque", "torque"),
+    Quantity("output_torque", "torque"),
+    Quantity("input_current", "current"),
+)
 OUTPUT_CLOCK = "output_time"  # of the file of a second logger, where it is called otherwise than that of the first
 RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _SIGNALS = ("V", "mV", "uV", "mV/V", "V/V", "mA", "A")
@@ -112,7 +117,7 @@ def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
 def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:
     """Return the sign and unit of a channel, as the user says, else the file, else the channel's name."""
     named = [
-        unit for q in (*WANTED, *TORQUES) if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit
+        unit for q in (*WANTED, *INSTEAD_OF_FORCES) if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit
     ]
     # A heading such as input_torque_N_m was read as one in m, which only the name of the quantity can tell.
     read = [*named, channel.unit] if quantity.endswith("torque") else [channel.unit, *named]
@@ -121,7 +126,7 @@ def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: Colu
         raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {reason}.", ("channels", quantity))
     stated = next((unit for unit in (source.unit if source else None, *read) if unit), "")
     if not stated:
-        units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}
+        units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m", "input_current": "A"}
         example = units.get(quantity, "N")
         raise DatasetError(
             f"{file.path.name}: the channel {shown(channel.name)} does not state its unit; give it, such as --channel "
@@ -220,7 +225,7 @@ def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
     Raises:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
     """
-    return parse_sources(texts, "--channel", [*(quantity.name for quantity in (*WANTED, *TORQUES)), OUTPUT_CLOCK])
+    return parse_sources(texts, "--channel", [*(quantity.name for quantity in (*WANTED, *INSTEAD_OF_FORCES)), OUTPUT_CLOCK])
 
 
 def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:

@@ -70,7 +70,7 @@ def find_strokes(
 def cable_of(description: Description) -> RopeStrokes | LoopStrokes:
     """Return what the strokes of a cable are found by; of a loop with the preload that is stated for all wrap angles."""
     if description.cable.kind != "loop":
-        return RopeStrokes(description.sensors.gain_sd or 0.0, description.fits_offsets)
+        return RopeStrokes(description.gain_sd or 0.0, description.shifts_forces)
     stated = description.preload.value
     return LoopStrokes(stated.to("force") if stated is not None and not description.preload_follows_stretch else None)
 

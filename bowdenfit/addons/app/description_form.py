@@ -28,7 +28,7 @@ from bowdenfit.addons.app.description_values import (
 from bowdenfit.errors import UsageError
 from bowdenfit.kinds import KINDS
 from bowdenfit.questions.schema.schemas import make_schema
-from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED
+from bowdenfit.recordings.named_channels import INSTEAD_OF_FORCES, OUTPUT_CLOCK, WANTED
 from bowdenfit.words import capitalized
 
 Path: TypeAlias = tuple[str | int, ...]
@@ -210,7 +210,7 @@ def _list_known_names(raw: Mapping[str, Any], key: str, path: Path) -> list[str]
     of_cable = [*columns, route.get("variable", "cable_length")] if isinstance(route, Mapping) else columns
     names = [name for name in (columns if key == "wrap_angles" else of_cable) if isinstance(name, str)]
     if key == "channels":
-        names += [*(quantity.name for quantity in (*WANTED, *TORQUES)), OUTPUT_CLOCK]
+        names += [*(quantity.name for quantity in (*WANTED, *INSTEAD_OF_FORCES)), OUTPUT_CLOCK]
     kind = KINDS.get(str(path[1])) if key == "columns" else None
     for wanted in kind.init_questions.columns if kind is not None and kind.init_questions is not None else ():
         names += [quantity.name for quantity in (wanted.quantity, *wanted.also)]

@@ -312,7 +312,7 @@ def _allowed_gain(force_in: Vector, force_out: Vector, description: Description)
     sensors, largest = description.sensors, max(force_in.max(), force_out.max())
     # No cell is made for more than its rope may have, whatever a wrong unit makes of the other.
     zero_in, zero_out = (_ZERO_ERROR * min(largest, force.max() / _LEAST) for force in (force_in, force_out))
-    of_gain = GAIN_ERROR if sensors.gain_sd is None else _SDS * sensors.gain_sd
+    of_gain = GAIN_ERROR if description.gain_sd is None else _SDS * description.gain_sd
     if sensors.offset_sd is not None:
         zero_in = zero_out = _SDS * sensors.offset_sd.to("force")
     return np.asarray(of_gain + np.hypot(zero_in / force_in, zero_out / force_out))

@@ -18,6 +18,7 @@ from bowdenfit.kinds.forces.stated_noise import describe_scatter, log_ratio_vari
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, efficiency_readings
 from bowdenfit.kinds.measured_columns import MeasuredColumn, pair_forces
+from bowdenfit.kinds.motor_readings import check_gear, convert_to_motor_readings
 from bowdenfit.kinds.plausibility import (
     SCATTER,
     CoarseReadings,
@@ -91,7 +92,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         "forces at both ends of the cable, one pair of readings a row",
         (
             WantedColumn(
-                Quantity("input_force", "force"), "the force at the motor", (Quantity("input_torque", "torque"),)
+                Quantity("input_force", "force"),
+                "the force at the motor",
+                (Quantity("input_torque", "torque"), Quantity("input_current", "current")),
             ),
             WantedColumn(
                 Quantity("output_force", "force"), "the force at the load", (Quantity("output_torque", "torque"),)
@@ -159,8 +162,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
 
     @override
     def check(self, table: ForceTable, description: Description, measurements: Measurements) -> None:
-        """Refuse rows without wrap angles, an output that does not follow the input, and rows that gain force."""
+        """Refuse rows without wrap angles, a gear that they do not show, an output that does not follow, and gains of force."""
         super().check(table, description, measurements)
+        check_gear(description, table, table.stroke, table.input_force, listed(table.origin.files))
         check_following(table)
         check_gains(table, description)
 
@@ -233,7 +237,8 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     def file_rows(self, table: ForceTable, description: Description) -> FileRows:
         measured = np.isfinite(table.own.angle).any(axis=0)
         angles = np.rad2deg(table.own.angle[:, measured])
-        inputs, outputs = format_fixed(table.input_force, 3), format_fixed(table.output_force, 3)
+        heading, readings = convert_to_motor_readings(table.input_force, description)
+        inputs, outputs = format_fixed(readings, 3), format_fixed(table.output_force, 3)
         sds = [] if table.sd is None else [format_fixed(column, 3) for column in table.sd.T if np.all(column > 0)]
         rows = [
             [
@@ -249,7 +254,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         ]
         names = [f"{name}_deg" for name, there in zip(table.own.names, measured, strict=True) if there]
         of_sds = [f"{end}_force_sd_N" for end in ("input", "output")][2 - len(sds) :]
-        return [*route_heading(description), *names, "run", "stroke", "input_force_N", "output_force_N", *of_sds], rows
+        return [*route_heading(description), *names, "run", "stroke", heading, "output_force_N", *of_sds], rows
 
     @override
     def design_contradiction(self, design: ForceDesign, description: Description) -> str:
@@ -280,7 +285,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
 def _warn_of_gains(table: ForceTable, description: Description) -> list[str]:
     """Warn where one stroke was read and nothing is said of the gains; both strokes tell them from friction."""
     strokes = np.unique(table.stroke[table.stroke != 0])
-    if len(strokes) != 1 or description.sensors.gain_sd is not None:
+    if len(strokes) != 1 or description.gain_sd is not None:
         return []
     slides = (table.stroke != 0) & (table.input_force > 0) & (table.output_force > 0)
     loss = abs(float(np.mean(np.log(table.input_force[slides] / table.output_force[slides])))) if slides.any() else 0.0

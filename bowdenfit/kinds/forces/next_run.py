@@ -142,7 +142,7 @@ def make_run_simulator(
         output = cable.friction.output_force(values, force, shift, stroke)
         ratios = (cable.description.sensors.noise_ratio, 1.0) if design.sd is None else design.sd.T
         cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.n_effective))
-        read_in = cells.shown_input(force) + noise * ratios[0] * jax.random.normal(of_input, output.shape)
+        read_in = cells.shown_input(force, stroke) + noise * ratios[0] * jax.random.normal(of_input, output.shape)
         read_out = cells.shown_output(output) + noise * ratios[1] * jax.random.normal(of_output, output.shape)
         least = cable.friction.conditions.least_force
         ratio = jnp.log(jnp.maximum(read_in, least) / jnp.maximum(read_out, least))
@@ -156,7 +156,7 @@ def _straight_line(cable: CableContacts, design: RunDesign) -> np.ndarray:
     columns = [np.ones(len(design.stroke))]
     if len(np.unique(design.stroke)) > 1:
         columns.append(design.stroke)
-    offsets = cable.description.fits_offsets
+    offsets = cable.description.shifts_forces
     if (cable.friction.depends_on_load or offsets) and np.ptp(np.log(design.input_force)) > np.log(_SPREAD):
         columns.append(np.log(design.input_force))
     speed = np.log(np.maximum(np.abs(np.nan_to_num(design.velocity)), 1e-9))

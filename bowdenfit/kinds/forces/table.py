@@ -295,16 +295,22 @@ def _describe_conditions(route: Vector, own: OwnAngles, unit: str) -> list[str]:
 
 
 def _read_tensions(table: RawTable, columns: Mapping[str, Column], description: Description, end: str) -> Vector:
-    """Return the tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
+    """Return the tensions at one end [N], from its forces, or from its torques or currents."""
     column = find_end_column(table, columns, end)
-    values = np.array(column.read_cells(partial(_read_force, column), np.nan))
+    is_motor = end == "input" and description.motor is not None
+    values = np.array(column.read_cells(partial(_read_force, column, is_motor), np.nan))
     return convert_to_forces(values, table, columns, end, description)
 
 
-def _read_force(column: Column, cell: Cell) -> float:
+def _read_force(column: Column, is_motor: bool, cell: Cell) -> float:
     value = column.value(cell)
     if value < 0:
         cell.refuse_missing_code()
+    if value <= 0 and is_motor:
+        raise cell.refuse(
+            f"{cell.shown} is not positive; the usual cause is the sign convention of the motor, or a return in which it has "
+            "to push its gear back: write what pulls the rope as positive, and leave such a return out."
+        )
     if value <= 0:
         raise cell.refuse(
             f"{cell.shown} is not positive; the usual cause is the sign convention of the load cell or a "

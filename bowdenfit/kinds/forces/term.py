@@ -21,7 +21,7 @@ from bowdenfit.kinds.plausibility import choose_unused_columns
 from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
-from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
+from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_gear, declare_offsets, declare_run_scatter
 from bowdenfit.kinds.sliding_rows import ONE_LOAD, ExpectedForces, SlidingRows, expected_forces, range_by_group
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth, repeat_rows, spare_count
@@ -232,7 +232,7 @@ def _expect_forces(
         together = np.unique(keys[rows], axis=0, return_inverse=True)[1].ravel()
         forces = table.input_force[used][rows], table.output_force[used][rows]
         sd = None if table.sd is None else table.sd[used][rows]
-        part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets, sd)
+        part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.shifts_forces, sd)
         weight[rows] = 1 / log_ratio_variance(noises[rows], part.input_force, part.output_force)
         for name, values in vars(part).items():
             if not single[rows].any() or name == "log_ratio_error":
@@ -288,9 +288,9 @@ class ForceTerms(TermKind[ForceTable]):
 
     @override
     def parameters(self, table: ForceTable, at: Circumstances) -> list[Parameter]:
-        """Return scatter, noise and offsets; inside a run readings are normal, whatever the noise of mountings."""
+        """Return scatter, noise, offsets and a gear; inside a run readings are normal, whatever the noise of mountings."""
         noise = declare_force_noise(at) if table.sd is None else _declare_noise_factor()
-        return [declare_run_scatter(at), noise, *declare_offsets(at)]
+        return [declare_run_scatter(at), noise, *declare_offsets(at), *declare_gear(at)]
 
     @override
     def draw(self, table: ForceTable, truth: Truth) -> dict[str, Array]:
@@ -309,7 +309,7 @@ class ForceTerms(TermKind[ForceTable]):
         output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
         cells, slides = LoadCells.of(values), table.stroke != 0
         noises = scale * values[name_noise(table)] * table.noises(cable.description.sensors.noise_ratio).T
-        read = cells.shown_input(force) + noises[0] * jax.random.normal(of_input, force.shape)
+        read = cells.shown_input(force, stroke) + noises[0] * jax.random.normal(of_input, force.shape)
         return {
             "input_force": jnp.where(slides, read, force),
             "output_force": jnp.where(

@@ -166,7 +166,7 @@ def select_sliding_blocks(recording: Recording, description: Description) -> Sel
     stroke, force_in, force_out = recording.strokes.stroke[used], blocks.input_force[used], blocks.output_force[used]
     noise = estimate_output_noise(recording, ratio)
     group = np.unique(stroke, return_inverse=True)[1]
-    expected = expected_forces(force_in, force_out, group, ratio, noise, description.fits_offsets)
+    expected = expected_forces(force_in, force_out, group, ratio, noise, description.shifts_forces)
     variance = np.zeros(len(used))
     for share, force in ((ratio, expected.input_force), (1.0, expected.output_force)):
         variance += (share / force) ** 2 * (1 + 2.5 * (share * noise / force) ** 2)

@@ -12,6 +12,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.headings import Quantity
 from bowdenfit.kinds.bench_error import BenchError, order_of
 from bowdenfit.kinds.kind import FrictionKind, Readings, efficiency_readings
+from bowdenfit.kinds.motor_readings import check_gear
 from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, explain_impossible_loss
 from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings, read_recordings
 from bowdenfit.kinds.rows import RowConditions
@@ -218,6 +219,11 @@ class RecordingKind(FrictionKind[Recordings]):
             return (
                 'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
             )
+        if settings is not None and settings.likelihood == "whole" and description.motor is not None:
+            return (
+                'likelihood = "whole" follows the force at the input through every turn, in which the gear of a [motor] has '
+                'friction of its own; write likelihood = "runs"'
+            )
         pages = [settings.prepare] if settings is not None else []
         pages += [entry.prepare for entry in description.recording if entry.prepare is not None]
         return next((reason for page in pages if (reason := _why_impossible(page))), "")
@@ -249,12 +255,15 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def check(self, table: Recordings, description: Description, measurements: Measurements) -> None:
-        """Refuse a recording outside the range of the curves whose wrap angles were measured nowhere.
+        """Refuse a recording outside the range of the curves whose wrap angles were measured nowhere, and a hidden gear.
 
         Raises:
             DatasetError: Says which.
         """
-        route, angles = description.route, measurements.table(AngleTable)
+        route, angles, items = description.route, measurements.table(AngleTable), table.items
+        used = [(r.strokes.stroke[r.strokes.used_sliding], r.blocks.input_force[r.strokes.used_sliding]) for r in items]
+        strokes, loads = (np.concatenate(parts) for parts in zip(*used, strict=True))
+        check_gear(description, angles_of_recordings(table), strokes, loads, listed([r.file for r in items]))
         if route is None or angles is None:
             return
         curved = [table.columns.index(c.wrap_angle.column) for c in description.curved if c.wrap_angle.column]
@@ -286,9 +295,10 @@ class RecordingKind(FrictionKind[Recordings]):
     def bench_faults(self, table: Recordings, description: Description) -> list[str]:
         """Return a sentence on each kind of fault, of the recording that shows it most clearly.
 
-        A loop that is off center by more than cells disagree is one, unless errors of the gains or offsets are fitted.
+        A loop that is off center by more than cells disagree is one, unless errors of the gains or offsets are fitted. Behind
+        a gear, whose friction is its own, the input does not tell its faults by itself.
         """
-        if table.loop:
+        if table.loop or description.motor is not None:
             return []
         options = {option.strip() for option in description.friction_model.split("+")}
         expects_drag = description.fits_offsets or bool(options & {"drag", "load-dependent"})
@@ -299,7 +309,7 @@ class RecordingKind(FrictionKind[Recordings]):
             if fault and (fault.kind not in clearest or fault.significance > clearest[fault.kind][0].significance):
                 clearest[fault.kind] = fault, recording.file
         sentences = [describe_bench_fault(*clear) for clear in clearest.values()]
-        if description.fits_offsets or description.sensors.gain_sd:
+        if description.fits_offsets or description.gain_sd:
             return sentences
         farthest = max(table.items, key=lambda recording: abs(recording.strokes.center))
         off_center = describe_off_center(farthest.name, farthest.strokes.center)

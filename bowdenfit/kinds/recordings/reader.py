@@ -22,7 +22,7 @@ from bowdenfit.kinds.rows import OwnAngles, RowConditions, unify_labels
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.angle_channels import refuse_other_angle
 from bowdenfit.recordings.forces import separate_joined_clocks, to_recording
-from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED, rows_where
+from bowdenfit.recordings.named_channels import INSTEAD_OF_FORCES, OUTPUT_CLOCK, WANTED, rows_where
 from bowdenfit.recordings.preparation import (
     NO_DELAY_OF_LOOPS,
     Inspected,
@@ -295,7 +295,7 @@ def _read_file(source: Source, path: Path, entry: RecordingFile, files_of_all: S
         rows,
         _recording_name(path, entry),
         sources,
-        description.cable.pulleys,
+        description.pulleys,
         is_loop=description.cable.kind == "loop",
         output_file=output_rows[0] if output_rows else None,
     )
@@ -340,7 +340,7 @@ def _make_recording(description: Description, file: _File, blocks: Blocks, accou
 
 def _check_channel_names(channels: Mapping[str, ColumnSource], description: Description) -> dict[str, ColumnSource]:
     """Return the channels of the description; refuse those of quantities that a recording does not have."""
-    known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), OUTPUT_CLOCK, *location_names(description)]
+    known = [*(quantity.name for quantity in (*WANTED, *INSTEAD_OF_FORCES)), OUTPUT_CLOCK, *location_names(description)]
     for name in channels:
         if name not in known:
             raise DescriptionError(

@@ -51,6 +51,7 @@ from bowdenfit.kinds.recordings.whole_recordings import (
 from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import (
+    declare_gear,
     declare_noise_of_forces,
     declare_offsets,
     declare_preload,
@@ -99,7 +100,8 @@ class RecordingTerms(TermKind[Recordings]):
             Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
         )  # fmt: skip
         of_loop = declare_preload(at) if at.cable.is_loop else []
-        return [*of_loop, declare_run_scatter(at), block_noise, *declare_offsets(at), *([delay] if late > 0 else [])]
+        of_input = [*declare_offsets(at), *declare_gear(at)]
+        return [*of_loop, declare_run_scatter(at), block_noise, *of_input, *([delay] if late > 0 else [])]
 
     @override
     def draw(self, table: Recordings, truth: Truth) -> dict[str, Array]:
@@ -296,6 +298,7 @@ def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array
     force = jnp.asarray(pad_columns([smooth_input(r.blocks.input_force) for r in recordings.items]))
     velocity = jnp.asarray(pad_columns([r.blocks.velocity for r in recordings.items]))
     step = jnp.asarray(pad_columns([block_steps(r.blocks.time) for r in recordings.items], "constant"))
+    stroke = jnp.asarray(pad_columns([last_contact(r.strokes.contact) for r in recordings.items]), dtype=float)
     cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent, step)
     at_least = jnp.maximum(force, drive.least_force)
     output, _ = drive.follow(at_least, scale * mounting, _start_positions(drive, recordings, at_least, scale * mounting))
@@ -307,7 +310,7 @@ def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array
     noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
     errors = [sd * jax.random.normal(k, shape)[error_numbers, np.arange(shape[1])] for sd, k in noises]
     return {
-        "input_force": cells.shown_input(force) + errors[0],
+        "input_force": cells.shown_input(force, stroke) + errors[0],
         "output_force": cells.shown_output(output),
         "output_error": errors[1],
         "delay_error": jnp.asarray(scale * cells.delay_error),

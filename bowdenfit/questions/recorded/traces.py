@@ -217,7 +217,9 @@ def _step_arrays(
     }
     likely = pad_columns([step.input_force for step in steps])
     times = pad_columns([block_steps(r.blocks.time[s.block]) for r, s in chosen], "constant")
-    return held | {"angles": rows, "likely_force": likely, "drift": pad_columns(rates, "constant"), "step": times}
+    strokes = pad_columns([last_contact(r.strokes.contact)[s.block].astype(float) for r, s in chosen])
+    drifts = pad_columns(rates, "constant")
+    return held | {"angles": rows, "likely_force": likely, "drift": drifts, "step": times, "stroke": strokes}
 
 
 def _make_follow_function(
@@ -230,7 +232,7 @@ def _make_follow_function(
         drive = make_drive(model.cable, values, angles, data["velocity"], step=data["step"])
         cells, least = LoadCells.of(values), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))
-        output, _ = drive.follow(cells.true_input(data["likely_force"], least), mounting, start)
+        output, _ = drive.follow(cells.true_input(data["likely_force"], least, data["stroke"]), mounting, start)
         return drive.without_delay(cells.shown_output(output), cells.late(data["drift"])), drive.exponent
 
     return follow

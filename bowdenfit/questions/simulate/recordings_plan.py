@@ -134,6 +134,10 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         raise DescriptionError(
             f'{file} has no [recordings]: say what to record, such as lengths = [440, 470], speeds = ["20 r/min"].'
         )
+    if "motor" in raw:
+        raise DescriptionError(
+            f"{file} has a [motor], and recordings are simulated of two load cells; leave it out, or plan tables with [design]."
+        )
     truth, description = parse_truth(raw, file), description_without_recordings(raw, file)
     try:
         page = _Plan.model_validate({"recordings": raw["recordings"]}).recordings

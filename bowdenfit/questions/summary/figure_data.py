@@ -85,7 +85,7 @@ def _predict_forces(
         exponent = cable.friction_exponent(values, angles, chosen.group, chosen.route)
         exponent = exponent * friction.rate(values, jnp.asarray(velocity[which]))
         cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
-        read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)
+        read = friction.output_force(values, cells.true_input(force, least, stroke), exponent[more], stroke)
         return cells.shown_output(read, least), jnp.sum(angles, axis=-1)
 
     strokes = np.array(STROKES, dtype=float)[None, :, None]

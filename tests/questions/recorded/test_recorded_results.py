@@ -175,17 +175,17 @@ def test_the_sentence_on_speed_says_no_more_than_the_interval(q05, q95, probabil
     assert words in effect.sentence()
 
 
-@pytest.mark.slow
+@pytest.mark.extended
 def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_rate, tmp_path, run):
     folder = tmp_path / "comparison"
     code, out, err = run("compare", "--json", "-o", folder, plain[1], with_rate[1])
-    assert code == 0, err
+    assert code == 3, err  # both fits are too short to have converged
     words = " ".join((folder / "comparison.txt").read_text().split())
     assert "The data cannot distinguish" in words
     assert "Letting friction depend on speed (rate) predicts no better than not (plain)." in words
     assert "viscous" in words
     page = json.loads(out)
-    assert {row["name"] for row in page["fits"]} == {"plain", "rate"}
+    assert {row["name"]: row["troubles"] for row in page["fits"]} == {"plain": "not converged", "rate": "not converged"}
     assert page["fits"][0]["elpd_difference"] == 0.0
 
 

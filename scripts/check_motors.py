@@ -96,10 +96,10 @@ def recording(bench: dict[str, float], bend: float, factor: float, rng: np.rando
 
 def describe(bench: dict[str, float], kind: str, rng: np.random.Generator) -> str:
     """Return cable.toml."""
-    recorded, bends, stated = KINDS[kind]
+    recorded, bends, gear_is_stated = KINDS[kind]
     constant = bench["torque_constant"]
     gear = ""
-    if stated:
+    if gear_is_stated:
         efficiency = min(bench["efficiency"] + EFFICIENCY_SD * rng.standard_normal(), 0.99)
         friction = bench["gear_friction"] * (1 + 0.2 * rng.standard_normal())
         gear = (
@@ -122,7 +122,7 @@ def describe(bench: dict[str, float], kind: str, rng: np.random.Generator) -> st
 
 
 def inspect_bench(task: tuple[str, int]) -> tuple[str, int, str, bool, str]:
-    """Fit one bench; return its kind and seed, how it ended, whether the interval of mu holds it, and what was said."""
+    """Fit one bench; return its kind and seed, how it ended, whether the interval of mu holds it, and what was message."""
     import bowdenfit as bf
 
     kind, seed = task
@@ -142,8 +142,8 @@ def inspect_bench(task: tuple[str, int]) -> tuple[str, int, str, bool, str]:
         except bf.BowdenfitError as error:
             return kind, seed, "refused", False, str(error)
     mu, verdict = fit.parameter("mu"), fit.verdict()
-    said = f"mu {mu.q05:.4f} to {mu.q95:.4f} for {bench['mu']:.4f}; {'; '.join(verdict.reasons)}"
-    return kind, seed, "trusted" if verdict.trusted else "not trusted", bool(mu.q05 <= bench["mu"] <= mu.q95), said
+    message = f"mu {mu.q05:.4f} to {mu.q95:.4f} for {bench['mu']:.4f}; {'; '.join(verdict.reasons)}"
+    return kind, seed, "trusted" if verdict.trusted else "not trusted", bool(mu.q05 <= bench["mu"] <= mu.q95), message
 
 
 def main() -> None:
@@ -155,11 +155,11 @@ def main() -> None:
     tasks = [(kind, seed) for kind in KINDS for seed in range(options.first, options.first + options.benches)]
     ends, held = {kind: Counter[str]() for kind in KINDS}, Counter[str]()
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        for kind, seed, end, holds, said in pool.map(inspect_bench, tasks):
+        for kind, seed, end, holds, message in pool.map(inspect_bench, tasks):
             ends[kind][end] += 1
             held[kind] += holds and end == "trusted"
             if (end == "trusted") != holds or (end == "refused") != (kind == ALL_REFUSED):
-                print(f"{seed:3d} {kind}: {end}: {said}", flush=True)
+                print(f"{seed:3d} {kind}: {end}: {message}", flush=True)
     few = False
     for kind, counts in ends.items():
         print(f"{kind}: {dict(counts)}, holds the truth in {held[kind]} of {counts['trusted']}")

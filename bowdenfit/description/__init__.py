@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from bowdenfit.description.cable_parts import CableSettings, ContactSettings, Motor, Pulleys, Route, WrapAngle
+from bowdenfit.description.cable_parts import CableSettings, ContactSettings, MotorSettings, Pulleys, Route, WrapAngle
 from bowdenfit.description.defaults import BenchErrors, PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.measurements import (
     MOST_FILES,
@@ -59,7 +59,7 @@ __all__ = [
     "HalfNormalPrior",
     "LogNormalPrior",
     "Measured",
-    "Motor",
+    "MotorSettings",
     "Noise",
     "NonNegative",
     "NormalPrior",
@@ -93,7 +93,6 @@ RESERVED_NAMES = ("chain", "draw", "optimal_length", "optimal_efficiency")
 
 _MOST_CONTACTS = 100  # judged: on-body cables have three; equal ones can be joined, because their wrap angles add up
 _DEPARTURE = {"continuous": "smooth", "published": "none"}  # of angles from their curves, where nothing is stated, by geometry
-_OF_LOAD_CELLS = ("efficiencies", "displacement", "loop")  # tables whose input no motor's current can be
 _MOST_SETTINGS = 1000  # judged: more than one for each coefficient of each group
 AnySettings = TypeVar("AnySettings")
 
@@ -113,7 +112,7 @@ class Description(Display, Frozen):
     reference_force: QuantityValue | None = None
     reference_velocity: QuantityValue | None = None
     cable: CableSettings = CableSettings()
-    motor: Motor | None = None
+    motor: MotorSettings | None = None
     route: Route | None = None
     contact: Annotated[tuple[ContactSettings, ...], Field(min_length=1, max_length=_MOST_CONTACTS)]
     friction: dict[str, FrictionSetting] = Field(default_factory=dict, max_length=_MOST_SETTINGS)
@@ -207,8 +206,6 @@ class Description(Display, Frozen):
                 f'friction_model = "{of_turns[0]}" is of the turns of the motion, in which a gear has friction of its own; '
                 "leave it out, or read a load cell at the input"
             )
-        if others := [name for name in self.tables.stated if name in _OF_LOAD_CELLS]:
-            yield f"[motor] belongs to the tables forces and recordings; fit {listed(others)} in a data set without it"
 
     @property
     def fits_offsets(self) -> bool:

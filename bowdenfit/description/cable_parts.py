@@ -148,7 +148,7 @@ def _with_unit(unit: str) -> BeforeValidator:
     return BeforeValidator(lambda stated: {"value": stated, "unit": unit} if isinstance(stated, int | float) else stated)
 
 
-class Motor(Frozen):
+class MotorSettings(Frozen):
     r"""A motor with a gear, whose current or torque was recorded in the place of a load cell at the input.
 
     .. math:: F_\text{in} = \frac{\eta N K_t I - T_g}{r} \text{ pulling}, \quad
@@ -164,7 +164,7 @@ class Motor(Frozen):
     gear_friction: QuantityValue | None = None
 
     @model_validator(mode="after")
-    def _possible(self) -> "Motor":
+    def _possible(self) -> "MotorSettings":
         for name in ("torque_constant", "gear_ratio"):
             stated = getattr(self, name)
             if stated is not None and stated.value <= 0:
@@ -196,7 +196,7 @@ class Pulleys:
 
     input_radius: float | None = None
     output_radius: float | None = None
-    motor: Motor | None = None
+    motor: MotorSettings | None = None
 
     def forces(self, values: np.ndarray, quantity: str, file: str) -> np.ndarray:
         """Return forces on the rope [N] from torques [N mm] or currents [A]; those of a motor as if its gear lost nothing.

@@ -87,6 +87,11 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
         with faults.collect(key_path=("tables",)):
             if reason := kind.contradiction(settings, description):
                 raise DescriptionError(f"{file}: {reason}.")
+            if settings is not None and description.motor is not None and kind.needs_load_cell:
+                raise DescriptionError(
+                    f"{file}: the table {kind.name} needs the force at the input, and [motor] gives its current or torque in "
+                    "tables of forces and recordings alone; fit the table in a data set without [motor]."
+                )
             if settings is not None:
                 check_quantities(kind.quantities(settings, description), file)
     faults.refuse()

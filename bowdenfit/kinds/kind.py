@@ -92,6 +92,7 @@ class Kind(ABC, Generic[AnyTable]):
         settings: Model of the settings under its name in [tables].
         heading: Heading over the lines of `describe`, where they are a section of their own.
         methods_sentence: How its readings are modeled, in a sentence of a paper.
+        needs_load_cell: Whether it cannot stand beside a [motor] in the place of the input's load cell.
         takes_channels: Whether its files are recordings, whose channels can be named on the command line.
         init_questions: How `bowdenfit init` recognizes its files, and what it asks about them; None if it never offers it.
         term_class: Module and class of its half in the likelihood, such as "scratch.losses.term:LossTerms", if another package
@@ -101,6 +102,7 @@ class Kind(ABC, Generic[AnyTable]):
     settings: type[TableSettings] = Table
     heading: str = ""
     methods_sentence: str = ""
+    needs_load_cell: bool = False
     takes_channels: bool = False
     init_questions: InitQuestions | None = None
     term_class: str = ""

@@ -13,7 +13,7 @@ _ALIKE = 0.05  # relative range of loads that count as one; a judgement
 def check_gear(description: Description, rows: ForceRows, stroke: Labels, loads: Vector, file: str) -> None:
     """Refuse readings in which the losses of a gear and of the cable are one number, whatever is measured.
 
-    At one bend, what a gear loses of the torque cannot be told from what the cable loses of the force, nor at one load its
+    At one bend, what a gear loses of the torque cannot be separated from what the cable loses of the force, nor at one load its
     friction; at several bends, or without the cable, they can.
 
     Args:
@@ -44,14 +44,14 @@ def check_gear(description: Description, rows: ForceRows, stroke: Labels, loads:
     if motor.gear_efficiency is None:
         raise DatasetError(
             f"{file}: all readings have the same wrap angles and gear_efficiency is not stated, so that what the gear of the "
-            "motor loses cannot be told from what the cable loses. State it under [motor] with its error, such as "
+            "motor loses cannot be separated from what the cable loses. State it under [motor] with its error, such as "
             f'gear_efficiency = {{ value = 0.8, unit = "1", sd = 0.05 }}, or {remedy}.'
         )
     ranges = [np.ptp(loads[stroke == way]) / np.max(loads) for way in np.unique(stroke)]
     if motor.gear_friction is None and max(ranges, default=0.0) < _ALIKE:
         raise DatasetError(
             f"{file}: all readings have the same wrap angles and one load, and gear_friction is not stated, so that friction "
-            "of the gear cannot be told from that of the cable. State it under [motor] with its error, such as gear_friction = "
+            "of the gear cannot be separated from that of the cable. State it under [motor] with its error, as gear_friction = "
             f'{{ value = 0.1, unit = "N*m", sd = 0.02 }}, add readings at other loads, or {remedy}.'
         )
 

@@ -57,6 +57,7 @@ class DisplacementKind(
     """One load cell and one position, with a spring or a stop at the far end."""
 
     name = "displacement"
+    needs_load_cell = True
     table = DisplacementTable
     settings = DisplacementSettings
     readings = (

@@ -81,6 +81,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
     """Efficiencies that were calculated before, one a row."""
 
     name = "efficiencies"
+    needs_load_cell = True
     table = EfficiencyTable
     readings = (efficiency_readings("efficiency", "efficiencies", "efficiencies", "efficiency at {}"),)
     methods_sentence = (

@@ -29,13 +29,13 @@ def currents(bends, noise=0.0, seed=0, loads=(20, 40, 60, 80, 100), constant=CON
     return rows
 
 
-def folder_of(path, rows, motor=MOTOR, cable=CABLE, heading="input_current_A", more=""):
+def folder_of(path, rows, motor=MOTOR, cable=CABLE, heading="input_current_A", more="", tables=""):
     path.mkdir(exist_ok=True)
     lines = [f"run,stroke,bend_deg,{heading},output_force_N", *rows]
     (path / "forces.csv").write_text("\n".join(lines) + "\n")
     (path / "cable.toml").write_text(
         f'name = "rope"\n{more}\n{cable}{motor}[[contact]]\nname = "sheath"\nfriction = "mu"\n'
-        'wrap_angle = { column = "bend" }\n[tables]\nforces = { file = "forces.csv" }\n'
+        'wrap_angle = { column = "bend" }\n[tables]\nforces = { file = "forces.csv" }\n' + tables
     )
     return path
 
@@ -97,6 +97,7 @@ def test_intervals_contain_the_cable_at_one_bend_only_as_well_as_the_gear_is_sta
         ((90, 180), {"motor": MOTOR.replace("mNm/A", "mNm")}, "does not measure a torque constant"),
         ((90, 180), {"cable": CABLE + 'kind = "loop"\n'}, "is that of a single rope"),
         ((90, 180), {"more": 'friction_model = "dahl"'}, "of the turns of the motion"),
+        ((90, 180), {"tables": 'efficiencies = { file = "e.csv" }\n'}, r"the table efficiencies needs the force at the input"),
     ],
 )  # fmt: skip
 def test_motors_that_cannot_be_used_are_refused(tmp_path, bends, keywords, says):

@@ -84,7 +84,7 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 }
 _NO_ERRORS = (
     "errors.angle={value=0,unit='deg'}",
-    *(f"errors.{name}=0" for name in ("angle_scale", "gain", "hysteresis", "load_exponent", "wear")),
+    *(f"errors.{name}=0" for name in ("angle_scale", "crosstalk", "gain", "hysteresis", "load_exponent", "wear", "zero")),
 )
 
 

@@ -42,6 +42,7 @@ NOTICEABLE_SIZE = 0.02  # relative size of the departure below which it is not r
 # Judgement: shift of a coefficient by a drifting zero, over half of its 90 % interval, above which the drift is reported.
 NOTICEABLE_SHIFT = 0.5
 _FRICTION = ("friction", "friction_model")  # roles of the parameters that a drifting zero could move
+_KINDS_BY_KEY = {"angle": ("angle_offset",), "zero": ("input_zero", "output_zero")}  # of errors whose key has another name
 # Judgements below; `scripts/check_benches.py` counts the false alarms that they give together.
 _MANY = 30  # readings from which the heteroskedasticity-consistent test is used too
 _CURVE_DEGREE, _POSITION_DEGREE = 4, 2  # degree of the polynomials tested for curves, and for other readings
@@ -208,7 +209,7 @@ def _correct_bench_errors(basin: Basin, solution: Solution) -> Solution:
     learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end) if keys else None
     if learned is None:
         return solution
-    mean = learned.mean_of({"angle_offset" if key == "angle" else key for key in keys})
+    mean = learned.mean_of({kind for key in keys for kind in _KINDS_BY_KEY.get(key, (key,))})
     explained = (learned.columns + solution["jacobian"] @ learned.moves) @ mean
     residuals, start = {}, 0
     for table, of_table in solution["residuals"].items():

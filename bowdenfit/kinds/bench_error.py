@@ -12,6 +12,7 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Labels, Vector
 
+_READ_CELLS = frozenset({"forces", "recordings", "loop"})  # tables that hold the readings of both load cells
 STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 
 
@@ -27,6 +28,8 @@ class BenchError:
         angle_offset: Error that all wrap angles share [rad].
         wear: Change of friction from the first mounting, or row, to the last, relative to its middle [1].
         load_exponent: Exponent by which friction grows with the load, beyond the model's; none at the middle load [1].
+        input_zero, output_zero: What a load cell reads without a load, relative to the largest force that it read [1].
+        crosstalk: Share of the input force that the output's reading holds [1].
     """
 
     gain: float = 0.0
@@ -35,6 +38,9 @@ class BenchError:
     angle_offset: float = 0.0
     wear: float = 0.0
     load_exponent: float = 0.0
+    input_zero: float = 0.0
+    output_zero: float = 0.0
+    crosstalk: float = 0.0
 
     @property
     def kind(self) -> str:
@@ -50,6 +56,19 @@ class BenchError:
             stroke: +1 pulling, -1 returning, 0 neither.
         """
         return output_force * (1 + self.gain) * (1 - self.hysteresis * np.asarray(stroke) / 2)
+
+    def apply_to_cells(
+        self, input_force: Vector, output_force: Vector, stroke: Vector | Labels, largest: tuple[float, float]
+    ) -> tuple[Vector, Vector]:
+        """Return input and output forces [N] as the bench would read them.
+
+        Args:
+            input_force, output_force: As they were read.
+            stroke: +1 pulling, -1 returning, 0 neither.
+            largest: Largest force that each cell read [N].
+        """
+        output = self.apply_to_force(output_force + self.crosstalk * input_force, stroke)
+        return input_force + self.input_zero * largest[0], output + self.output_zero * largest[1]
 
     def apply_to_friction(self, input_force: Vector | float, output_force: Vector, order: Vector | float = 0.0) -> Vector:
         """Return output forces of sliding readings as friction would make them that is worn, or depends on the load.
@@ -89,7 +108,7 @@ class ErrorSource:
     """One cause of error.
 
     Args:
-        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear" or "load exponent".
+        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear", "load exponent", "zeros" or "crosstalk".
         words: The same with how well it is known.
         steps: Small errors of the readings that stand for it, each with its standard uncertainty in such steps.
         cells: How many independent errors within the same limits add up to it: 2 for two load cells.
@@ -101,6 +120,11 @@ class ErrorSource:
     cells: int = 1
 
     JSON: ClassVar = ("name", "words")
+
+    @property
+    def heading(self) -> str:
+        """Heading of a column of its shifts."""
+        return {"wrap angles": "angles", "load exponent": "load"}.get(self.name, self.name)
 
 
 def iterate_error_sources(description: Description) -> Iterator[ErrorSource]:
@@ -130,3 +154,13 @@ def iterate_error_sources(description: Description) -> Iterator[ErrorSource]:
     if limits.load_exponent:
         words = f"a load exponent within {limits.load_exponent:g}"
         yield ErrorSource("load exponent", words, {BenchError(load_exponent=STEP): limits.load_exponent / sqrt(3) / STEP})
+    if not _READ_CELLS.intersection(description.tables.stated):
+        return
+    if limits.zero and not description.fits_offsets:
+        words = f"a zero of each load cell known to {100 * limits.zero:g} % of its largest force"
+        has_input = description.sensors.noise_ratio > 0 and description.motor is None  # no hung weight, and no motor
+        cells = (BenchError(output_zero=STEP), *([BenchError(input_zero=STEP)] if has_input else []))
+        yield ErrorSource("zeros", words, dict.fromkeys(cells, limits.zero / sqrt(3) / STEP))
+    if limits.crosstalk:
+        words = f"crosstalk of up to {100 * limits.crosstalk:g} %"
+        yield ErrorSource("crosstalk", words, {BenchError(crosstalk=STEP): limits.crosstalk / sqrt(3) / STEP})

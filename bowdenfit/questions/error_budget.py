@@ -45,6 +45,9 @@ _SHOWN_ERRORS = {  # words, unit and factor in which an error is shown, by field
     "angle_offset": ("the offset of all wrap angles", "deg", float(np.rad2deg(1.0))),
     "wear": ("the change of friction from the first mounting to the last", "%", 100.0),
     "load_exponent": ("the load exponent", "", 1.0),
+    "input_zero": ("the zero of the input's load cell, of its largest force,", "%", 100.0),
+    "output_zero": ("the zero of the output's load cell, of its largest force,", "%", 100.0),
+    "crosstalk": ("the share of the input force in the output's reading", "%", 100.0),
 }
 TITLE = "Error budget: what bench errors add"
 _INCLUDED = "The intervals of the first page include them."
@@ -257,17 +260,18 @@ def list_answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
     return quantities
 
 
-HEADS = ("quantity", "readings alone", "with errors", "k", "dof", "angles", "gain", "hysteresis", "wear", "load")
-_SOURCES = ("wrap angles", "gain", "hysteresis", "wear", "load exponent")
+def budget_heads(budget: ErrorBudget) -> tuple[str, ...]:
+    """Return the headings of `budget_rows`."""
+    return ("quantity", "readings alone", "with errors", "k", "dof", *(source.heading for source in budget.sources))
 
 
 def budget_rows(budget: ErrorBudget) -> list[tuple[str, ...]]:
-    """Return a row for each quantity, under `HEADS`: both intervals, and the shifts by one standard deviation."""
+    """Return a row for each quantity: both intervals, and the shifts by one standard deviation of each source."""
     rows = list[tuple[str, ...]]()
     for row in budget.rows:
         digits = row.readings.digits
         name = row.quantity if row.unit in ("", "1") else f"{row.quantity} ({row.unit})"
-        shifts = [f"{row.shifts[source]:.1g}" if source in row.shifts else "-" for source in _SOURCES]
+        shifts = [f"{row.shifts[source.name]:.1g}" for source in budget.sources]
         intervals = row.readings.range_text(digits), row.bench.range_text(digits)
         rows.append((name, *intervals, f"{row.coverage_factor:.2f}", f"{row.degrees_of_freedom:.0f}", *shifts))
     return rows
@@ -280,17 +284,19 @@ def budget_text(fit: Record) -> str:
         return ""
     note = (
         "k is the coverage factor, dof the effective degrees of freedom by Welch and Satterthwaite, inf where tails are those "
-        "of a normal distribution; the last five columns are the shifts by one standard uncertainty of each error, as far as "
+        "of a normal distribution; the other columns are the shifts by one standard uncertainty of each error, as far as "
         "readings leave it open. Propagated by Monte Carlo (JCGM 101)."
     )
-    lines = [TITLE, table(HEADS, budget_rows(budget)), *(filled(sentence) for sentence in (*budget.sentences(), note))]
-    return "\n".join(lines)
+    sentences = (filled(sentence) for sentence in (*budget.sentences(), note))
+    return "\n".join([TITLE, table(budget_heads(budget), budget_rows(budget)), *sentences])
 
 
 def budget_section(fit: Record) -> PageSection | None:
     """Return the error budget as a section of the report; None without draws."""
     budget = error_budget(fit)
-    return prose_section(TITLE, budget.sentences(), [PageTable(HEADS, tuple(budget_rows(budget)))]) if budget else None
+    if budget is None:
+        return None
+    return prose_section(TITLE, budget.sentences(), [PageTable(budget_heads(budget), tuple(budget_rows(budget)))])
 
 
 def answer_interval(fit: Record, quantity: str) -> Interval:

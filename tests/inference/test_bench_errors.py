@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.inference.bench_errors import LearnedErrors
-from bowdenfit.kinds.bench_error import BenchError, ErrorSource, order_of
+from bowdenfit.inference.bench_errors import LearnedErrors, _estimate_noise
+from bowdenfit.kinds.bench_error import BenchError, ErrorSource, iterate_error_sources, order_of
 from bowdenfit.questions.error_budget import with_bench_errors
 
 MU, LOADS = 0.15, (20.0, 40.0, 80.0, 120.0)
@@ -47,8 +47,10 @@ def test_a_learned_error_has_the_posterior_of_normal_readings():
     assert np.var(draws) == pytest.approx(0.2, rel=0.01)
 
 
-def bench(path, gain=0.0, exponent=0.0, seed=1):
-    """Write a sweep of eight mountings whose output cell reads too much, or whose friction depends on the mean tension."""
+def bench(path, gain=0.0, exponent=0.0, seed=1, crosstalk=0.0, zeros=(0.0, 0.0)):
+    """Write a sweep of eight mountings whose output cell reads too much, or part of the input, or whose friction depends on the
+    mean tension; zeros of both cells are in newtons.
+    """
     rng, rows = np.random.default_rng(seed), ["run,stroke,input_force_N,output_force_N,wrap_angle_deg"]
     middle = np.exp(np.mean(np.log(LOADS)))
     for number, bend in enumerate(np.linspace(45, 270, 8)):
@@ -58,8 +60,8 @@ def bench(path, gain=0.0, exponent=0.0, seed=1):
                 loss = 0.0
                 for _ in range(20):
                     loss = MU * (load * np.exp(-stroke * loss / 2) / middle) ** exponent * np.radians(bend) + mounting
-                output = load * np.exp(-stroke * loss) * (1 + gain) * (1 + rng.normal(0, 0.004))
-                rows.append(f"m{number},{'pull' if stroke > 0 else 'return'},{load},{output:.5f},{bend:.1f}")
+                output = (load * np.exp(-stroke * loss) + crosstalk * load) * (1 + gain) * (1 + rng.normal(0, 0.004)) + zeros[1]
+                rows.append(f"m{number},{'pull' if stroke > 0 else 'return'},{load + zeros[0]},{output:.5f},{bend:.1f}")
     path.write_text("\n".join(rows) + "\n")
     return path
 
@@ -93,6 +95,50 @@ def test_a_load_exponent_within_its_stated_limit_is_learned_inside_runs(tmp_path
     assert "The readings reveal that the load exponent is -0." in " ".join(str(fit).split())
     assert exponent.mean == pytest.approx(-0.1, abs=3 * exponent.sd) and exponent.is_learned
     assert not bf.fit(path, seed=1, settings=["errors.load_exponent=0.01"]).verdict().trusted
+
+
+def test_crosstalk_within_its_stated_limit_is_learned_although_it_was_noise_to_the_readings_alone(tmp_path):
+    path = bench(tmp_path / "bench.csv", crosstalk=0.03)
+    fit = bf.fit(path, seed=1, settings=["errors.crosstalk=0.05"])
+    crosstalk, interval = learned(fit, "share of the input force"), fit.error_budget.row("mu").bench
+    assert fit.verdict().trusted, fit.verdict().reasons
+    assert crosstalk.is_learned and crosstalk.mean == pytest.approx(3.0, abs=2 * crosstalk.sd)
+    assert interval.q05 < MU < interval.q95
+    alone = bf.fit(path, seed=1)
+    assert not alone.verdict().trusted
+    assert not any("share of the input" in error.name for error in alone.error_budget.learned)
+
+
+def test_zeros_within_their_stated_limit_are_learned_and_corrected_for(tmp_path):
+    fit = bf.fit(bench(tmp_path / "bench.csv", zeros=(0.0, 2.4)), seed=1, settings=["errors.zero=0.03"])
+    zero, interval = learned(fit, "zero of the output"), fit.error_budget.row("mu").bench
+    assert fit.verdict().trusted, fit.verdict().reasons
+    assert zero.is_learned
+    assert interval.q05 < MU < interval.q95
+    with_offsets = bf.fit(tmp_path / "bench.csv", seed=1, settings=['sensors.offset_sd={value=1,unit="N"}'])
+    assert not any("zero" in error.name for error in with_offsets.error_budget.learned)  # they are parameters
+
+
+@pytest.mark.parametrize(("table", "names"), [("efficiency", set()), ("weights", {"output_zero"})])
+def test_only_cells_that_were_read_have_a_zero(tmp_path, table, names):
+    path, settings = bench(tmp_path / "bench.csv"), []
+    if table == "efficiency":
+        path.write_text("efficiency,wrap_angle_deg\n0.9,45\n0.8,90\n0.7,135\n0.6,200\n")
+    else:
+        settings = ['sensors.force_noise={value=0.1,unit="N"}', "sensors.input_force_noise=0"]
+    sources = iterate_error_sources(bf.read(path, settings=settings).description)
+    assert {step.kind for source in sources for step in source.steps if "zero" in step.kind} == names
+
+
+def test_noise_is_what_errors_leave_of_it():
+    """Readings of noise 0.5 and an error of 4, which without it seem to scatter by both together."""
+    rng = np.random.default_rng(2)
+    error, mean = rng.choice([-1.0, 1.0], 400)[:, None], np.ones((400, 1))
+    readings = 4 * error[:, 0] + 0.5 * rng.standard_normal(400)
+    alone = _estimate_noise(mean, readings, np.ones(1), np.zeros(1))
+    both = _estimate_noise(np.hstack([mean, error]), readings, np.ones(2), np.zeros(2))
+    assert alone == pytest.approx(np.hypot(4, 0.5), rel=0.02)
+    assert both == pytest.approx(0.5, rel=0.1)
 
 
 def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):

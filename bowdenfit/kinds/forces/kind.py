@@ -212,11 +212,13 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
 
     @override
     def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:
-        """Return the table with the error in its output forces and wrap angles."""
+        """Return the table with the error in its forces and wrap angles."""
         order = order_of(table.run, len(table.run_names))
         worn = error.apply_to_friction(table.input_force, table.output_force, order)
-        force = error.apply_to_force(np.where(table.stroke != 0, worn, table.output_force), table.stroke)
-        return replace(table, output_force=force, own=error.apply_to_rows(table.own))
+        forces = table.input_force, np.where(table.stroke != 0, worn, table.output_force)
+        largest = float(table.input_force.max()), float(table.output_force.max())
+        input_force, output_force = error.apply_to_cells(*forces, table.stroke, largest)
+        return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override
     def why_implausible(self, measured: ForceTable, simulated: ForceTable) -> str:

@@ -209,9 +209,11 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
 
     @override
     def with_bench_error(self, table: LoopTable, error: BenchError) -> LoopTable:
-        """Return the table with the error in its output forces and wrap angles."""
-        force = error.apply_to_force(table.output_force, table.stroke)
-        return replace(table, output_force=force, own=error.apply_to_rows(table.own))
+        """Return the table with the error in its forces and wrap angles."""
+        forces = table.input_force, table.output_force
+        largest = float(np.abs(forces[0]).max()), float(np.abs(forces[1]).max())
+        input_force, output_force = error.apply_to_cells(*forces, table.stroke, largest)
+        return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override
     def why_implausible(self, measured: LoopTable, simulated: LoopTable) -> str:

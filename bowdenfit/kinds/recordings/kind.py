@@ -317,15 +317,18 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def with_bench_error(self, table: Recordings, error: BenchError) -> Recordings:
-        """Return the recordings with the error in their output forces and wrap angles; their strokes stay."""
+        """Return the recordings with the error in their forces and wrap angles; their strokes stay."""
+        of_input, of_output = ([getattr(r.blocks, end).max() for r in table.items] for end in ("input_force", "output_force"))
+        largest = float(max(of_input)), float(max(of_output))
         items, order = [], order_of(np.array([table.runs.index(recording.run) for recording in table.items]), len(table.runs))
         for recording, late in zip(table.items, order, strict=True):
-            force = recording.blocks.output_force
+            blocks, force = recording.blocks, recording.blocks.output_force
             if not table.loop:
-                force = error.apply_to_friction(recording.blocks.input_force, force, late)
-            force = error.apply_to_force(force, recording.strokes.contact)
+                force = error.apply_to_friction(blocks.input_force, force, late)
+            input_force, force = error.apply_to_cells(blocks.input_force, force, recording.strokes.contact, largest)
             angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
-            items.append(replace(recording, own_angle=angle, blocks=replace(recording.blocks, output_force=force, finer=None)))
+            read = replace(blocks, input_force=input_force, output_force=force, finer=None)
+            items.append(replace(recording, own_angle=angle, blocks=read))
         return replace(table, items=tuple(items))
 
     @override

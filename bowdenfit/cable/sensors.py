@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -27,6 +27,7 @@ BLOCK_NOISE = "sigma_block"
 DELAY_ERROR = "delay_error"
 INPUT_OFFSET, OUTPUT_OFFSET = "input_offset", "output_offset"
 GEAR_LOSS, GEAR_FRICTION = "gear_loss", "gear_friction"
+AnyArray = TypeVar("AnyArray", Array, np.ndarray)
 
 
 @dataclass(frozen=True)
@@ -38,20 +39,18 @@ class Gear:
         friction: Its friction at the rope, T_g / r [N].
     """
 
-    loss: Array | float
-    friction: Array | float
+    loss: Any
+    friction: Any
 
-    def rope_force(
-        self, motor_force: Float[Array, "*batch"], stroke: Float[Array, "*batch"] | float
-    ) -> Float[Array, "*batch"]:
+    def rope_force(self, motor_force: AnyArray, stroke: AnyArray | float) -> AnyArray:
         """Return the force on the rope [N] where the motor makes a force while it pulls (1), returns (-1) or neither (0)."""
-        return motor_force * jnp.exp(stroke * jnp.log1p(-self.loss)) - stroke * self.friction
+        force: AnyArray = motor_force * (1 - self.loss) ** stroke - stroke * self.friction
+        return force
 
-    def motor_force(
-        self, rope_force: Float[Array, "*batch"], stroke: Float[Array, "*batch"] | float
-    ) -> Float[Array, "*batch"]:
+    def motor_force(self, rope_force: AnyArray, stroke: AnyArray | float) -> AnyArray:
         """Return the force that the motor makes [N], inverse to `rope_force`."""
-        return (rope_force + stroke * self.friction) * jnp.exp(-stroke * jnp.log1p(-self.loss))
+        force: AnyArray = (rope_force + stroke * self.friction) * (1 - self.loss) ** -stroke
+        return force
 
 
 @dataclass(frozen=True)

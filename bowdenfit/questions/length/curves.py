@@ -14,6 +14,7 @@ from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.plots.curves import BAND_QUANTILES, Band
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.questions.length.wrap_angles_figure import AngleCurve
+from bowdenfit.questions.motor_gear import gear_factors
 from bowdenfit.results.along_route import route_grid
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, thinned_parameter_values
 
@@ -58,11 +59,12 @@ def collect_efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
             continue
         if route is None or position is None:
             position = np.full(len(term.labels), np.nan)
-        predicted = fit.least_squares.readings[term.name][None]
+        factors = gear_factors(fit, term)
+        predicted, observed = factors * fit.least_squares.readings[term.name][None], factors * term.observed()
         if fit.sampled is not None:
-            predicted = np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))
+            predicted = factors * np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))
         inside = (position >= route.range[0]) & (position <= route.range[1]) if route else np.ones(len(position), dtype=bool)
-        points.append(EfficiencyPoints(reading_kind.are_runs, term.labels, position, term.observed(), predicted, inside))
+        points.append(EfficiencyPoints(reading_kind.are_runs, term.labels, position, observed, predicted, inside))
     return tuple(points)
 
 

@@ -4,7 +4,7 @@ Output forces follow from the measured input force by the cable's play operator,
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -22,6 +22,7 @@ from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.models import Model
+from bowdenfit.questions.motor_gear import gear_factors, rope_measurements
 from bowdenfit.recordings.preparation.hysteresis import last_contact, smooth_input
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values, thinned_parameter_values
@@ -119,7 +120,7 @@ class RecordingFollower:
 @cached_per_fit
 def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
     """Trace every recording of a fit; empty without any."""
-    recordings = fit.dataset.measurements.table(Recordings)
+    recordings = rope_measurements(fit).table(Recordings)
     if recordings is None:
         return ()
     with jax.enable_x64(True):
@@ -217,9 +218,7 @@ def _step_arrays(
     }
     likely = pad_columns([step.input_force for step in steps])
     times = pad_columns([block_steps(r.blocks.time[s.block]) for r, s in chosen], "constant")
-    strokes = pad_columns([last_contact(r.strokes.contact)[s.block].astype(float) for r, s in chosen])
-    drifts = pad_columns(rates, "constant")
-    return held | {"angles": rows, "likely_force": likely, "drift": drifts, "step": times, "stroke": strokes}
+    return held | {"angles": rows, "likely_force": likely, "drift": pad_columns(rates, "constant"), "step": times}
 
 
 def _make_follow_function(
@@ -230,9 +229,9 @@ def _make_follow_function(
     def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
         angles = resolve_angles(model.cable, values, data["angles"])[0]
         drive = make_drive(model.cable, values, angles, data["velocity"], step=data["step"])
-        cells, least = LoadCells.of(values), drive.least_force
+        cells, least = replace(LoadCells.of(values), gear=None), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))
-        output, _ = drive.follow(cells.true_input(data["likely_force"], least, data["stroke"]), mounting, start)
+        output, _ = drive.follow(cells.true_input(data["likely_force"], least), mounting, start)
         return drive.without_delay(cells.shown_output(output), cells.late(data["drift"])), drive.exponent
 
     return follow
@@ -243,11 +242,12 @@ def estimate_run_efficiencies(fit: Record) -> dict[str, tuple[np.ndarray, float,
     recordings, posterior = fit.dataset.measurements.table(Recordings), fit.sampled
     assert recordings is not None  # the caller has traces of them
     term = next(t for t in fit.model.terms if t.name == RECORDED)
-    observed = term.observed()
+    factors = gear_factors(fit, term)
+    observed = factors * term.observed()
     weight = np.asarray(getattr(term.data, "run_weight", np.full(len(observed), np.nan)), dtype=float)
-    expected, sigma = fit.least_squares.readings[RECORDED][None], float("nan")
+    expected, sigma = factors * fit.least_squares.readings[RECORDED][None], float("nan")
     if posterior is not None:
-        expected = np.quantile(posterior.expected[RECORDED], QUANTILES, axis=(0, 1))
+        expected = factors * np.quantile(posterior.expected[RECORDED], QUANTILES, axis=(0, 1))
         sigma = float(np.median(posterior.values[BLOCK_NOISE]))
     sd = observed * sigma / np.sqrt(weight)
     return {run: (expected[:, i], float(observed[i]), float(sd[i])) for i, run in enumerate(recordings.runs)}

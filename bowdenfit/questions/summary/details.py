@@ -20,6 +20,7 @@ from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.loss import loss_text
+from bowdenfit.questions.motor_gear import GEAR_NOTE
 from bowdenfit.questions.recorded.friction_effects import (
     SHOWN_SPEED,
     compare_speeds,
@@ -262,7 +263,8 @@ def _measured_block(fit: Record, page: dict[str, Any]) -> str:
                 percent(row['relative_error'], 2, "+"),
             ]
         )
-    return "Efficiency, measured and predicted\n" + table(heads, rows)
+    note = f"\n{filled(GEAR_NOTE)}" if fit.dataset.description.motor is not None else ""
+    return f"Efficiency, measured and predicted\n{table(heads, rows)}{note}"
 
 
 def _design_answer(fit: Record) -> str:

@@ -18,6 +18,7 @@ from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.plots.curves import choose_evenly, support
 from bowdenfit.plots.style import axis_label
 from bowdenfit.questions.bends.curves import evaluate_curves, quantiles_of_draws
+from bowdenfit.questions.motor_gear import rope_measurements
 from bowdenfit.questions.summary.forces_figure import ONE_BEND, STROKES, ForcesAtBend, ForcesData
 from bowdenfit.questions.summary.pairs_figure import SampledQuantity
 from bowdenfit.questions.summary.verdict import BETWEEN_MOUNTINGS, assess_fit
@@ -31,7 +32,7 @@ _WIDE = 20.0  # ratio of the largest to the smallest load from which axes are lo
 
 def collect_forces(fit: Record) -> ForcesData | None:
     """Return readings and law of a table of forces; None without one."""
-    table = fit.dataset.measurements.table(ForceTable)
+    table = rope_measurements(fit).table(ForceTable)
     if table is None:
         return None
     rows = np.array(choose_evenly(range(len(table.run)), MOST_READINGS))
@@ -84,8 +85,8 @@ def _predict_forces(
         angles, _ = resolve_angles(cable, values, chosen)
         exponent = cable.friction_exponent(values, angles, chosen.group, chosen.route)
         exponent = exponent * friction.rate(values, jnp.asarray(velocity[which]))
-        cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
-        read = friction.output_force(values, cells.true_input(force, least, stroke), exponent[more], stroke)
+        cells, more = replace(LoadCells.of(values), gear=None), (...,) + (None,) * (jnp.ndim(force) - 1)
+        read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)
         return cells.shown_output(read, least), jnp.sum(angles, axis=-1)
 
     strokes = np.array(STROKES, dtype=float)[None, :, None]
@@ -94,7 +95,7 @@ def _predict_forces(
     def curves(values: Mapping[str, Any]) -> dict[str, Any]:
         law, angle = output(values, first, jnp.asarray(grid), jnp.asarray(strokes))
         at_rows, bend = output(values, rows, jnp.asarray(table.input_force[rows]), jnp.asarray(table.stroke[rows]))
-        apparent = strokes * jnp.log(grid / law) / jnp.maximum(angle, _LEAST_ANGLE)[:, None, None]
+        apparent = strokes * jnp.log(grid / law) / jnp.where(angle > _LEAST_ANGLE, angle, jnp.nan)[:, None, None]
         return {"law": law, "apparent": apparent, "rows": at_rows, "bend": bend}
 
     return evaluate_curves(fit, curves)

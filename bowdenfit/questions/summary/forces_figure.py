@@ -307,7 +307,8 @@ def draw_apparent_friction(axes: Axes, forces: ForcesData) -> None:
     axes.set_ylim(*_find_coefficient_limits(forces))
     if forces.by_bend:
         draw_against_wrap_angle(axes, forces, "apparent_law")
-    colored, any_curved = [] if forces.by_bend else assign_colors(forces), False
+    bent = [place for place in assign_colors(forces) if np.isfinite(place[0].capstan)]
+    colored, any_curved = [] if forces.by_bend else bent, False
     one_line = colored and _lines_coincide(forces)
     for here, color in [(colored[0][0], BLACK)] if one_line else [(here, color) for here, color, _ in colored]:
         for i, stroke in enumerate(STROKES):
@@ -325,7 +326,7 @@ def draw_apparent_friction(axes: Axes, forces: ForcesData) -> None:
 
 def _lines_coincide(forces: ForcesData) -> bool:
     """Return whether several places have one coefficient, so that their lines are one."""
-    lines = np.array([middle(here.apparent_law) for here in forces.places if here.shown])
+    lines = np.array([middle(here.apparent_law) for here in forces.places if here.shown and np.isfinite(here.capstan)])
     return bool(len(lines) > 1 and np.ptp(lines) < SAME_COEFFICIENT * np.max(np.abs(lines)))
 
 

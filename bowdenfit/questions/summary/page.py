@@ -20,6 +20,7 @@ from bowdenfit.questions.error_budget import answer_interval, error_budget, find
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss import loss_by_contact
+from bowdenfit.questions.motor_gear import gear_factors
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force, predict_stick_slip
 from bowdenfit.questions.summary.verdict import agreement_page, assess_fit
 from bowdenfit.recordings.recording import Recordings
@@ -213,16 +214,17 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
     for term in fit.model.terms:
         if not find_readings(term.name).are_efficiencies:
             continue
-        observed, forces = term.observed(), _input_forces(fit, term)
+        factors, forces = gear_factors(fit, term), _input_forces(fit, term)
+        observed = factors * term.observed()
         for i, label in enumerate(term.labels):
             row: dict[str, Any] = {"table": term.name, "label": label, "measured": float(observed[i])}
             if fit.sampled is not None:
-                expected = Interval.of(fit.posterior.expected[term.name][..., i])
-                replicated = fit.posterior.replicated[term.name][..., i]
+                expected = Interval.of(factors[i] * fit.posterior.expected[term.name][..., i])
+                replicated = factors[i] * fit.posterior.replicated[term.name][..., i]
                 row |= {"predicted": expected.median, "q05": expected.q05, "q95": expected.q95}
                 row["predictive_q05"], row["predictive_q95"] = (float(q) for q in np.quantile(replicated, (0.05, 0.95)))
             else:
-                row["predicted"] = float(fit.least_squares.readings[term.name][i])
+                row["predicted"] = float(factors[i] * fit.least_squares.readings[term.name][i])
             if len(forces):
                 row["input_force_N"] = float(forces[i])
             row["relative_error"] = row["measured"] / row["predicted"] - 1

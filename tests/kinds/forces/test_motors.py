@@ -2,42 +2,13 @@
 
 import numpy as np
 import pytest
+from motor_benches import CABLE, CONSTANT, EFFICIENCY, FRICTION, MOTOR, MU, STATED, currents, folder_of
 
 import bowdenfit as bf
 from bowdenfit.cable.sensors import Gear
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.kinds.forces.table import ForceTable
-
-MU, EFFICIENCY, FRICTION, RADIUS, RATIO, CONSTANT = 0.12, 0.7, 0.09, 0.015, 26.0, 0.06  # N m, m, 1, N m/A
-CABLE = '[cable]\ninput_pulley_radius = { value = 15, unit = "mm" }\n'
-MOTOR = '[motor]\ntorque_constant = { value = 60, unit = "mNm/A", sd = 1 }\ngear_ratio = 26\n'
-STATED = 'gear_efficiency = { value = 0.72, unit = "1", sd = 0.03 }\ngear_friction = { value = 100, unit = "mN*m", sd = 30 }\n'
-
-
-def currents(bends, noise=0.0, seed=0, loads=(20, 40, 60, 80, 100), constant=CONSTANT, scatter=0.0):
-    """Rows of a table, by the balance of torques at the motor."""
-    rng, rows = np.random.default_rng(seed), []
-    for run, bend in enumerate(bends):
-        exponent = MU * np.deg2rad(bend) + scatter * rng.standard_normal() * (bend > 0)
-        for load in loads:
-            pulling = (load * np.exp(exponent) * RADIUS + FRICTION) / EFFICIENCY
-            returning = (load * np.exp(-exponent) * RADIUS - FRICTION) * EFFICIENCY
-            for stroke, torque in (("pull", pulling), ("return", returning)):
-                current, output = np.array([torque / RATIO / constant, load]) * (1 + noise * rng.standard_normal(2))
-                rows.append(f"{run},{stroke},{bend},{current:.8g},{output:.8g}")
-    return rows
-
-
-def folder_of(path, rows, motor=MOTOR, cable=CABLE, heading="input_current_A", more="", tables=""):
-    path.mkdir(exist_ok=True)
-    lines = [f"run,stroke,bend_deg,{heading},output_force_N", *rows]
-    (path / "forces.csv").write_text("\n".join(lines) + "\n")
-    (path / "cable.toml").write_text(
-        f'name = "rope"\n{more}\n{cable}{motor}[[contact]]\nname = "sheath"\nfriction = "mu"\n'
-        'wrap_angle = { column = "bend" }\n[tables]\nforces = { file = "forces.csv" }\n' + tables
-    )
-    return path
 
 
 def test_currents_become_forces_of_a_gear_that_loses_nothing(tmp_path):

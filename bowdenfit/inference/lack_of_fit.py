@@ -12,7 +12,7 @@ References:
     White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48 (1980), 817.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -111,13 +111,29 @@ def find_departures(
 ) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
     """Test every departure; return them by p-value, smallest first, and single readings that are outliers.
 
+    What an error of the bench explains whose limit the user states is no departure, because the answers include it; nor is what
+    a gain explains within the usual limit, which both strokes show of nearly every bench with two good load cells. Other usual
+    limits explain nothing here, because another model may be the reason: a curve that cannot follow the angles, or friction
+    that depends on the load.
+
     Args:
         basin: The minimum of least squares.
         scale: Scatter of every standardized residual about the minimum.
         reach: Half of the 90 % interval of each identified parameter, in its shown unit.
     """
     model = basin.problem.posterior.model
-    reweighed = _correct_bench_errors(basin, _reweigh_by_scatter(basin, model, scale))
+    keys, reweighed = model.description.errors.model_fields_set, _reweigh_by_scatter(basin, model, scale)
+    departures, outliers = _test_all(basin, _correct_bench_errors(basin, reweighed, keys), reach)
+    if "gain" not in keys and any(departure.is_noticeable for departure in departures):
+        departures, outliers = _test_all(basin, _correct_bench_errors(basin, reweighed, {*keys, "gain"}), reach)
+    return departures, outliers
+
+
+def _test_all(
+    basin: Basin, reweighed: Solution, reach: Mapping[str, float]
+) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
+    """Return every departure of a solution, by p-value, and its outliers."""
+    model = basin.problem.posterior.model
     system = group_residuals(model, reweighed)
     candidates = [departure for readings in system.readings for departure in _test_departures(system, readings)]
     if model.description.fits_offsets:  # of which nothing is left but what the linear approximation lacks
@@ -199,13 +215,14 @@ def _reweigh_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
     return reweighed if reweighed["succeeded"] and np.all(np.isfinite(reweighed["jacobian"])) else solution
 
 
-def _correct_bench_errors(basin: Basin, solution: Solution) -> Solution:
-    """Return a solution without what errors of the bench explain of its residuals, as far as stated limits let them.
+def _correct_bench_errors(basin: Basin, solution: Solution, keys: Collection[str]) -> Solution:
+    """Return a solution without what errors of the bench explain of its residuals, as far as their limits let them.
 
-    What an error explains whose limit the user states is no lack of fit: the answers include it. Usual limits explain nothing
-    here, because another model may be the reason: a curve that cannot follow the angles, or friction that depends on the load.
+    Args:
+        basin: The minimum of least squares.
+        solution: The solution.
+        keys: The errors that count, by their keys under [errors].
     """
-    keys = basin.problem.posterior.model.description.errors.model_fields_set
     learned = learn_at_minimum(basin.problem, solution["z"], basin.at_end) if keys else None
     if learned is None:
         return solution

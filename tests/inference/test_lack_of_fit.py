@@ -167,21 +167,37 @@ def test_chances_of_healthy_benches_are_uniform(tmp_path, judge, count, least, m
     assert least <= np.sum(np.array(smallest) < 0.2) <= most
 
 
+KNOWN_GAINS = ("errors.gain=0",)  # of cells whose gains no reading has to tell
 FAULTS = {
-    "a drag of a twentieth of the middle load": ({"drag": 3.5}, LOAD),
-    "a fifth more friction on the return": ({"asymmetry": 0.2}, STROKE),
-    "a twentieth more friction on the return": ({"asymmetry": 0.05}, STROKE),
-    "friction that rises by a fifth while it is measured": ({"drift": 0.2}, ORDER),
+    "a drag of a twentieth of the middle load": ({"drag": 3.5}, LOAD, ()),
+    "a fifth more friction on the return": ({"asymmetry": 0.2}, STROKE, ()),
+    "a twentieth more friction on the return": ({"asymmetry": 0.05}, STROKE, KNOWN_GAINS),
+    "friction that rises by a fifth while it is measured": ({"drift": 0.2}, ORDER, KNOWN_GAINS),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_inside_runs_are_named(tmp_path, judge, fault):
-    wrong, against = FAULTS[fault]
+    wrong, against, settings = FAULTS[fault]
     for seed in range(3):
-        clear = [d for d in judge(forces(tmp_path, seed, **wrong)) if d.is_noticeable]
+        clear = [d for d in judge.of(load_dataset(forces(tmp_path, seed, **wrong), settings)) if d.is_noticeable]
         assert against in {d.against for d in clear}
         assert all(d.inside for d in clear if d.against == against)
+
+
+@pytest.mark.parametrize("gain", [0.006, -0.01])
+def test_a_gain_within_the_limit_of_good_load_cells_is_no_departure(tmp_path, judge, gain):
+    """The answers are corrected for it; without the limit it is one."""
+    for seed in range(3):
+        folder = forces(tmp_path, seed, places=BENDS, repeats=1)
+        heading, *rows = (folder / "forces.csv").read_text().splitlines()
+        column = heading.split(",").index("output_force_N")
+        cells = [row.split(",") for row in rows]
+        for row in cells:
+            row[column] = f"{float(row[column]) * (1 + gain):.4f}"
+        (folder / "forces.csv").write_text("\n".join([heading, *(",".join(row) for row in cells)]) + "\n")
+        assert not [d for d in judge(folder) if d.is_noticeable]
+        assert [d for d in judge.of(load_dataset(folder, KNOWN_GAINS)) if d.is_noticeable]
 
 
 def test_a_bend_that_nobody_measured_is_told_by_the_other_bends(tmp_path, judge):

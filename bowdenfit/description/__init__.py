@@ -233,8 +233,8 @@ class Description(Display, Frozen):
     @property
     def pulleys(self) -> Pulleys:
         """What turns torques and currents into forces."""
-        stated = self.cable.input_pulley_radius, self.cable.output_pulley_radius
-        of_input, of_output = (None if radius is None else radius.to("length") for radius in stated)
+        radii = self.cable.input_pulley_radius, self.cable.output_pulley_radius
+        of_input, of_output = (None if radius is None else radius.to("length") for radius in radii)
         return Pulleys(of_input, of_output, self.motor)
 
     @property

@@ -145,7 +145,7 @@ def radius_setting(end: str) -> str:
 
 def _with_unit(unit: str) -> BeforeValidator:
     """Return what reads a plain number as a quantity in a unit."""
-    return BeforeValidator(lambda stated: {"value": stated, "unit": unit} if isinstance(stated, int | float) else stated)
+    return BeforeValidator(lambda value: {"value": value, "unit": unit} if isinstance(value, int | float) else value)
 
 
 class MotorSettings(Frozen):
@@ -166,9 +166,9 @@ class MotorSettings(Frozen):
     @model_validator(mode="after")
     def _possible(self) -> "MotorSettings":
         for name in ("torque_constant", "gear_ratio"):
-            stated = getattr(self, name)
-            if stated is not None and stated.value <= 0:
-                raise ValueError(f"{name} = {stated.value:g} must be more than 0")
+            factor = getattr(self, name)
+            if factor is not None and factor.value <= 0:
+                raise ValueError(f"{name} = {factor.value:g} must be more than 0")
         if self.gear_efficiency is not None and not 0 < self.gear_efficiency.value <= 1:
             raise ValueError(
                 f"gear_efficiency = {self.gear_efficiency.value:g} must be above 0 and at most 1, the share of the torque that "
@@ -183,11 +183,6 @@ class MotorSettings(Frozen):
         """Relative standard deviations of the factors from a current to a torque [1]."""
         factors = (self.torque_constant, self.gear_ratio)
         return tuple(factor.sd / factor.value for factor in factors if factor is not None and factor.sd is not None)
-
-    @property
-    def is_exact(self) -> bool:
-        """Whether its gear is stated without any doubt."""
-        return all(part is not None and part.sd is None for part in (self.gear_efficiency, self.gear_friction))
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ def _learn(
             numbers.append(number)
     errors = np.stack(columns, axis=1)
     readings = {name: np.stack([of_error[name] for of_error in of_readings], axis=1) for name in inside}
-    scale, inside_scales = _less_noise(posterior, (jacobian, errors, residuals), (readings, inside), (prior, z))
+    scale, inside_scales = _noise_factors(posterior, (jacobian, errors, residuals), (readings, inside), (prior, z))
     weighed, with_priors = errors * scale, np.concatenate([jacobian * scale, np.diag(np.where(prior > 0, prior, 1.0))])
     moves = -np.linalg.lstsq(with_priors, np.concatenate([weighed, np.zeros((len(prior), len(numbers)))]), rcond=None)[0]
     remaining = weighed + jacobian * scale @ moves
@@ -197,7 +197,7 @@ def _learn(
     return LearnedErrors(sources, np.array(numbers), -covariance @ gradient, covariance, information, moves, errors, readings)
 
 
-def _less_noise(
+def _noise_factors(
     posterior: LogDensity,
     residuals: tuple[np.ndarray, np.ndarray, np.ndarray],
     readings: tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]],

@@ -260,10 +260,10 @@ class RecordingKind(FrictionKind[Recordings]):
         Raises:
             DatasetError: Says which.
         """
-        route, angles, items = description.route, measurements.table(AngleTable), table.items
-        used = [(r.strokes.stroke[r.strokes.used_sliding], r.blocks.input_force[r.strokes.used_sliding]) for r in items]
-        strokes, loads = (np.concatenate(parts) for parts in zip(*used, strict=True))
-        check_gear(description, angles_of_recordings(table), strokes, loads, listed([r.file for r in items]))
+        route, angles = description.route, measurements.table(AngleTable)
+        sliding = [(r.strokes.stroke, r.blocks.input_force, r.strokes.used_sliding) for r in table.items]
+        strokes, loads = (np.concatenate([part[i][part[2]] for part in sliding]) for i in (0, 1))
+        check_gear(description, angles_of_recordings(table), strokes, loads, listed([r.file for r in table.items]))
         if route is None or angles is None:
             return
         curved = [table.columns.index(c.wrap_angle.column) for c in description.curved if c.wrap_angle.column]

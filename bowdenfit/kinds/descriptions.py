@@ -18,7 +18,7 @@ from bowdenfit.kinds.tables import Measurements
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import listed, shown
 
-_NEEDED_BY_TABLES = {"schema", "friction_model", "group", "cable", "route", "contact", "tables", "recording", "design"}
+_NEEDED_BY_TABLES = {"schema", "friction_model", "group", "cable", "motor", "route", "contact", "tables", "recording", "design"}
 """Keys without which tables cannot be read."""
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import ContactSettings, Description, FrictionSetting
+from bowdenfit.description import ContactSettings, Description, FrictionSetting, QuantityValue
 from bowdenfit.display import Block, Preformatted, Title, blocks_of, render_text, separate
 from bowdenfit.files.cells import AS_DECIMALS
 from bowdenfit.files.row_account import RowAccount
@@ -89,6 +89,7 @@ def data_set_blocks(dataset: Dataset) -> list[Block]:
         [_describe_route(description)],
         _list_lines("Contacts", contacts),
         _list_lines("Friction coefficients", settings),
+        *([_list_lines("Motor, read in place of a load cell", motor)] if (motor := _describe_motor(description)) else []),
         *(_list_lines(heading, section_lines) for heading, section_lines in sections),
         ["Rows of the files:", Preformatted("\n".join(f"  {line}" for line in rows))],
         [f"Warning: {warning}" for warning in warnings],
@@ -102,6 +103,24 @@ def _describe_route(description: Description) -> str:
         return "Route: none, so there is no length to choose."
     choices = f"; {counted(len(route.choices), 'length')} can be bought" if route.choices else ""
     return f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
+
+
+def _describe_motor(description: Description) -> list[str]:
+    """Return what is stated of a motor, and what is learned, line by line; nothing without one."""
+    motor = description.motor
+    if motor is None:
+        return []
+    gear = [("gear efficiency", motor.gear_efficiency), ("gear friction", motor.gear_friction)]
+    factors = [("torque constant", motor.torque_constant), ("gear ratio", motor.gear_ratio)]
+    lines = [f"{name}: {_describe_quantity(quantity)}" for name, quantity in factors if quantity is not None]
+    learned = "learned from the readings"
+    return lines + [f"{name}: {learned if quantity is None else _describe_quantity(quantity)}" for name, quantity in gear]
+
+
+def _describe_quantity(quantity: QuantityValue) -> str:
+    """Return a quantity with its standard deviation and unit."""
+    sd = "" if quantity.sd is None else f" ± {quantity.sd:g}"
+    return f"{quantity.value:g}{sd}{'' if quantity.unit == '1' else f' {quantity.unit}'}"
 
 
 def _list_lines(heading: str, lines: Iterable[str]) -> list[Block]:

@@ -117,3 +117,18 @@ def test_the_command_for_a_lone_file_names_its_current_and_its_motor(tmp_path, r
     options += ["--set", 'cable.input_pulley_radius={value=15,unit="mm"}', "--set", "motor.gear_ratio=26"]
     code, out, _ = run("fit", path, *options, "--no-mcmc", "--no-figures", "-o", tmp_path / "fit")
     assert code == 0, out
+
+
+def test_check_says_what_is_stated_of_a_motor_and_what_is_learned(tmp_path, run):
+    motor = MOTOR + 'gear_friction = { value = 0.1, unit = "N*m", sd = 0.03 }\n'
+    code, out, _ = run("check", folder_of(tmp_path / "data", currents((45, 90)), motor))
+    assert code == 0
+    for line in ("torque constant: 60 ± 1 mNm/A", "gear ratio: 26", "gear efficiency: learned from the readings",
+                 "gear friction: 0.1 ± 0.03 N*m"):  # fmt: skip
+        assert line in out
+
+
+def test_a_wrong_motor_is_the_only_thing_that_is_said_to_be_wrong(tmp_path):
+    with pytest.raises(BowdenfitError, match="gear_ratio") as caught:
+        load_dataset(folder_of(tmp_path, currents((45, 90)), MOTOR.replace("26", "-3")))
+    assert "2 things are wrong" not in str(caught.value)

@@ -33,9 +33,6 @@ from bowdenfit.inference.solver import ROUGH
 from bowdenfit.kinds.bench_error import ErrorSource, iterate_error_sources
 
 _FREE = 1e-6  # weight of a prior that does not count
-_ROUNDS = 10  # of estimating noise and errors in turn
-_LEAST_NOISE = 1e-6  # of the noise by the readings alone, of readings without any
-_LEAST_FREEDOM = 20  # readings inside runs beyond what errors and parameters can follow, from which their noise is estimated
 # Standard deviations of the estimate of an error within its limit, beyond which it contradicts that limit: so it is of one of
 # six errors in one healthy fit in a hundred.
 CONTRADICTION = 3.1
@@ -183,69 +180,16 @@ def _learn(
             numbers.append(number)
     errors = np.stack(columns, axis=1)
     readings = {name: np.stack([of_error[name] for of_error in of_readings], axis=1) for name in inside}
-    scale, inside_scales = _noise_factors(posterior, (jacobian, errors, residuals), (readings, inside), (prior, z))
-    weighed, with_priors = errors * scale, np.concatenate([jacobian * scale, np.diag(np.where(prior > 0, prior, 1.0))])
-    moves = -np.linalg.lstsq(with_priors, np.concatenate([weighed, np.zeros((len(prior), len(numbers)))]), rcond=None)[0]
-    remaining = weighed + jacobian * scale @ moves
-    information, gradient = weighed.T @ remaining, remaining.T @ (scale[:, 0] * residuals) + moves.T @ (prior * z)
+    with_priors = np.concatenate([jacobian, np.diag(np.where(prior > 0, prior, 1.0))])
+    moves = -np.linalg.lstsq(with_priors, np.concatenate([errors, np.zeros((len(prior), len(numbers)))]), rcond=None)[0]
+    remaining = errors + jacobian @ moves
+    information, gradient = errors.T @ remaining, remaining.T @ residuals + moves.T @ (prior * z)
     for name, single in readings.items():  # parameters do not follow readings inside cells
-        more = inside_scales[name] ** 2
-        information, gradient = information + more * single.T @ single, gradient + more * single.T @ inside[name]
+        information, gradient = information + single.T @ single, gradient + single.T @ inside[name]
     information = (information + information.T) / 2
     of_direction, directions = np.linalg.eigh(information)  # below 0 by rounding alone, where readings say nothing
     covariance = (directions / (1 + np.maximum(of_direction, 0.0))) @ directions.T
     return LearnedErrors(sources, np.array(numbers), -covariance @ gradient, covariance, information, moves, errors, readings)
-
-
-def _noise_factors(
-    posterior: LogDensity,
-    residuals: tuple[np.ndarray, np.ndarray, np.ndarray],
-    readings: tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]],
-    priors: tuple[np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, dict[str, float]]:
-    """Return factors on standardized residuals, because errors of the bench are no noise: of each, and of readings inside runs.
-
-    The noise of the readings alone holds what errors make of them, and would hide a large error in part. It is estimated anew
-    where there are enough readings inside runs, with the errors and without them, by expectation maximization.
-
-    Args:
-        posterior: The posterior.
-        residuals: Changes of residuals by parameters and by errors, and the residuals.
-        readings: Changes of readings inside runs by errors, and these readings, by table.
-        priors: Weight of the prior of each z, and its residuals.
-    """
-    (jacobian, errors, whole), (changes, inside), (prior, z) = residuals, readings, priors
-    scale, inside_scales, start = np.ones((len(whole), 1)), dict.fromkeys(inside, 1.0), 0
-    unknown = jacobian.shape[1] + errors.shape[1]
-    for term in posterior.model.terms:
-        counts = [count for count, _ in term.residual_blocks]
-        rows = np.arange(start + counts[0], start + sum(counts))
-        start += sum(counts)
-        single, free = inside[term.name], np.zeros((len(inside[term.name]), jacobian.shape[1]))
-        if len(rows) + len(single) < unknown + _LEAST_FREEDOM or not len(single):
-            continue
-        design = np.block([[jacobian[rows], errors[rows]], [free, changes[term.name]]])
-        deviations = np.concatenate([whole[rows], single])
-        read = (deviations != 0) | np.any(design != 0, axis=1)
-        design, deviations = design[read], deviations[read]
-        precision = np.concatenate([np.where(prior > 0, prior, 1.0), np.ones(errors.shape[1])])
-        expected = np.concatenate([z * (prior > 0), np.zeros(errors.shape[1])])
-        of_parameters = slice(0, jacobian.shape[1])
-        alone = _estimate_noise(design[:, of_parameters], deviations, precision[of_parameters], expected[of_parameters])
-        factor = alone / _estimate_noise(design, deviations, precision, expected)
-        scale[rows], inside_scales[term.name] = factor, factor
-    return scale, inside_scales
-
-
-def _estimate_noise(design: np.ndarray, deviations: np.ndarray, precision: np.ndarray, expected: np.ndarray) -> float:
-    """Return the noise of deviations r + D x with x normal about -`expected`, relative to what they are standardized by."""
-    noise = 1.0
-    for _ in range(_ROUNDS):
-        covariance = np.linalg.inv(np.diag(precision) + design.T @ design / noise**2)
-        x = -covariance @ (design.T @ deviations / noise**2 + precision * expected)
-        spread = (deviations + design @ x) ** 2 + np.sum((design @ covariance) * design, axis=1)
-        noise = max(float(np.sqrt(np.mean(spread))), _LEAST_NOISE)
-    return noise
 
 
 def _inside_runs(term: Any, values: Mapping[str, Any]) -> np.ndarray:

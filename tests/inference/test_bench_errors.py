@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.inference.bench_errors import LearnedErrors, _estimate_noise
+from bowdenfit.inference.bench_errors import LearnedErrors
 from bowdenfit.kinds.bench_error import BenchError, ErrorSource, iterate_error_sources, order_of
 from bowdenfit.questions.error_budget import with_bench_errors
 
@@ -97,7 +97,7 @@ def test_a_load_exponent_within_its_stated_limit_is_learned_inside_runs(tmp_path
     assert not bf.fit(path, seed=1, settings=["errors.load_exponent=0.01"]).verdict().trusted
 
 
-def test_crosstalk_within_its_stated_limit_is_learned_although_it_was_noise_to_the_readings_alone(tmp_path):
+def test_crosstalk_within_its_stated_limit_is_learned_and_corrected_for(tmp_path):
     path = bench(tmp_path / "bench.csv", crosstalk=0.03)
     fit = bf.fit(path, seed=1, settings=["errors.crosstalk=0.05"])
     crosstalk, interval = learned(fit, "share of the input force"), fit.error_budget.row("mu").bench
@@ -128,17 +128,6 @@ def test_only_cells_that_were_read_have_a_zero(tmp_path, table, names):
         settings = ['sensors.force_noise={value=0.1,unit="N"}', "sensors.input_force_noise=0"]
     sources = iterate_error_sources(bf.read(path, settings=settings).description)
     assert {step.kind for source in sources for step in source.steps if "zero" in step.kind} == names
-
-
-def test_noise_is_what_errors_leave_of_it():
-    """Readings of noise 0.5 and an error of 4, which without it seem to scatter by both together."""
-    rng = np.random.default_rng(2)
-    error, mean = rng.choice([-1.0, 1.0], 400)[:, None], np.ones((400, 1))
-    readings = 4 * error[:, 0] + 0.5 * rng.standard_normal(400)
-    alone = _estimate_noise(mean, readings, np.ones(1), np.zeros(1))
-    both = _estimate_noise(np.hstack([mean, error]), readings, np.ones(2), np.zeros(2))
-    assert alone == pytest.approx(np.hypot(4, 0.5), rel=0.02)
-    assert both == pytest.approx(0.5, rel=0.1)
 
 
 def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):

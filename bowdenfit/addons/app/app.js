@@ -42,7 +42,7 @@
   document.addEventListener("input", event => { if (event.target.matches("input[type=text]")) typed = event.target.value; });
   document.addEventListener("change", event => {
     const box = event.target; // which a browser tells of a box that is taken away too, where nobody listens any more
-    requestAnimationFrame(() => { if (box.isConnected) typed = null; });
+    queueMicrotask(() => { if (box.isConnected) typed = null; }); // before anything can be drawn again
   }, true);
   const restore = control => {
     control.focus({ preventScroll: true });

@@ -204,10 +204,10 @@ class Pulleys:
         Raises:
             DatasetError: The radius of that pulley is not known; or that of a current's motor.
         """
-        end, _, what = quantity.partition("_")
+        end, _, dimension = quantity.partition("_")
         radius = self.input_radius if end == "input" else self.output_radius
         constant = self.motor.torque_constant if self.motor is not None else None
-        if what == "current" and constant is None:
+        if dimension == "current" and constant is None:
             raise DatasetError(
                 f"{file} gives {quantity}, but nothing says what torque a current makes; add the motor to cable.toml, with its "
                 'own numbers: [motor] torque_constant = { value = 0.05, unit = "N*m/A", sd = 0.002 }, with gear_ratio, '
@@ -219,7 +219,7 @@ class Pulleys:
                 f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}; or for a file by itself, '
                 f"--set '{radius_setting(end)}'."
             )
-        factor = constant.to("torque_constant") if constant is not None and what == "current" else 1.0
+        factor = constant.to("torque_constant") if constant is not None and dimension == "current" else 1.0
         if end == "input" and self.motor is not None:
             factor *= self.motor.gear_ratio.to("ratio")
         return values * factor / radius

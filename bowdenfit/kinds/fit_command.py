@@ -209,8 +209,8 @@ def _name_forces(
 def _find_current(columns: Sequence[FileColumn]) -> FileColumn | None:
     """Return the column of a motor's current where no two columns can be forces; None otherwise."""
     currents = [column for column in columns if measures(column.written_unit, "current")]
-    others = [column for column in columns if column not in currents]
-    return currents[0] if currents and len(_forces_among(others, len(FORCES))) < len(FORCES) else None
+    remaining = [column for column in columns if column not in currents]
+    return currents[0] if currents and len(_forces_among(remaining, len(FORCES))) < len(FORCES) else None
 
 
 def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]:

@@ -290,12 +290,12 @@ def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *,
     Raises:
         DatasetError: There is none, or there are several.
     """
-    force, others = f"{end}_force", [name for name in _other_readings(end) if name in columns]
-    several = [name for name in (force, *others) if name in columns]
+    force, instead = f"{end}_force", [name for name in _other_readings(end) if name in columns]
+    several = [name for name in (force, *instead) if name in columns]
     if len(several) > 1:
         raise DatasetError(f"{table.file} has both {several[0]} and {several[1]}; leave one of the two columns out.")
     named = f"{force}_N or {end}_torque_N_m" if is_loop else f"{force}_N"
-    return columns[others[0]] if others else require_column(table, columns, force, named)
+    return columns[instead[0]] if instead else require_column(table, columns, force, named)
 
 
 def convert_to_forces(
@@ -363,11 +363,11 @@ def convert_excluded(reading: ExcludedReading, description: Description) -> Excl
     """Return a reading that the user leaves out with the forces on the rope, as `convert_to_forces` gives those of others."""
     values = dict(reading.values)
     for end in ("input", "output"):
-        force, others = f"{end}_force", [name for name in _other_readings(end) if name in values]
+        force, instead = f"{end}_force", [name for name in _other_readings(end) if name in values]
         with suppress(DatasetError):
-            if others and force not in values:
-                reading_at_end = np.array([values[others[0]]])
-                values[force] = float(description.pulleys.forces(reading_at_end, others[0], reading.file)[0])
+            if instead and force not in values:
+                reading_at_end = np.array([values[instead[0]]])
+                values[force] = float(description.pulleys.forces(reading_at_end, instead[0], reading.file)[0])
         if force in values:
             values[force] *= description.sensors.ratio(end)
     return replace(reading, values=values)

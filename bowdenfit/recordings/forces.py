@@ -255,10 +255,10 @@ def _find_instead_of_forces(
     """Return what was recorded in the place of forces with its channel, by the force."""
     instead = dict[str, tuple[str, Channel]]()
     for quantity in INSTEAD_OF_FORCES:
-        end, _, what = quantity.name.partition("_")
+        end = quantity.name.partition("_")[0]
         force, radius = f"{end}_force", pulleys.input_radius if end == "input" else pulleys.output_radius
-        has_source = radius is not None and (what == "torque" or pulleys.motor is not None)
-        expected = (is_loop and what == "torque") or has_source or quantity.name in sources
+        has_source = radius is not None and (quantity.dimension == "torque" or pulleys.motor is not None)
+        expected = (is_loop and quantity.dimension == "torque") or has_source or quantity.name in sources
         if not expected or (force in sources and quantity.name not in sources):
             continue
         channel = find_channel(file, quantity, sources)

@@ -76,7 +76,7 @@ def _is_usual(unit: str) -> bool:
     """Return whether tables measure something in a unit, so that "1 A" stays the label that it usually is."""
     if len(unit) == 1 and unit not in _SINGLE_LETTERS:
         return False
-    return bool(weight_of(unit)) or (is_unit(unit) and dimension_of(unit) not in ("other", "ratio"))
+    return bool(weight_of(unit)) or (is_unit(unit) and dimension_of(unit) not in ("other", "ratio", "current"))
 
 
 def _join_two_units(match: re.Match[str]) -> MeasuredCell | None:

@@ -170,8 +170,8 @@ def _name_forces(
     ends = {name: columns[candidates[0].position] for name, candidates in can_be.items() if candidates}
     sure = {name for name, candidates in can_be.items() if len(candidates) == 1}
     unnamed = [quantity.name for quantity in FORCES if quantity.name not in named]
-    if "input_force" in unnamed and "input_force" not in ends and (current := _find_current(columns)) is not None:
-        ends["input_force"] = current
+    current = _find_current(columns) if "input_force" in unnamed and "input_force" not in ends else None
+    ends |= {} if current is None else {"input_force": current}
     missing = [name for name in unnamed if name not in ends]
     remaining = _forces_among([column for column in columns if column not in ends.values()], len(missing))
     best = remaining[: len(missing)]
@@ -195,7 +195,7 @@ def _name_forces(
             end = name.removesuffix("_force")
             options += [(option, _naming(f"{end}_torque", ends[name].name)), ("--set", radius_setting(end))]
             provided.append(f"{shown(ends[name].name)} is the torque of a pulley of 15 mm at the {end}")
-        elif measures(ends[name].written_unit, "current"):
+        elif ends[name] is current:
             settings = 'motor.torque_constant={value=0.05,unit="N*m/A"}', radius_setting("input")
             options += [(option, _naming("input_current", ends[name].name)), *(("--set", setting) for setting in settings)]
             provided.append(f"{shown(ends[name].name)} is the current of a motor of 0.05 N m/A with a pulley of 15 mm")
@@ -207,10 +207,10 @@ def _name_forces(
 
 
 def _find_current(columns: Sequence[FileColumn]) -> FileColumn | None:
-    """Return the column of a motor's current where no two columns can be forces; None otherwise."""
+    """Return the only column of a current where one other can be a force: a motor's; two are signals of load cells."""
     currents = [column for column in columns if measures(column.written_unit, "current")]
-    remaining = [column for column in columns if column not in currents]
-    return currents[0] if currents and len(_forces_among(remaining, len(FORCES))) < len(FORCES) else None
+    forces = _forces_among([column for column in columns if column not in currents], len(FORCES))
+    return currents[0] if len(currents) == 1 and len(forces) == 1 else None
 
 
 def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]:
@@ -226,7 +226,7 @@ def _forces_among(columns: Sequence[FileColumn], least: int) -> list[FileColumn]
     of_torque = [column for column in measured if measures(column.written_unit, "torque")]
     of_weight = [column for column in measured if weight_of(units[column.name])]
     without_unit = [column for column in measured if not units[column.name]]
-    signals = [column for column in measured if units[column.name] and column.dimension in ("", "other", "ratio")]
+    signals = [column for column in measured if units[column.name] and column.dimension in ("", "other", "ratio", "current")]
     likely = list[FileColumn]()
     for group in (of_force, of_weight, of_torque, without_unit, [column for column in signals if column not in of_weight]):
         likely += _likeliest_first(group, least) if len(likely) < least else []

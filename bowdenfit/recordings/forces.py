@@ -323,7 +323,8 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
     name, below = headings[likely[0]]
     unit = unit_to_state(name, below, "N")
     end, read_unit = quantity.removesuffix("_force"), heading_of(name, below).unit
-    if measures(read_unit, "current") and end == "input":
+    currents = [heading for heading in headings if measures(heading_of(*heading).unit, "current")]
+    if currents == [(name, below)] and end == "input":  # several are signals of load cells
         return DatasetError(
             f"{has} If {shown(name)} is the current of the motor, name it and describe the [motor] with its torque_constant: "
             f"{option_naming('input_current', name, '', '--channel')}. {other}"

@@ -132,3 +132,12 @@ def test_a_wrong_motor_is_the_only_thing_that_is_said_to_be_wrong(tmp_path):
     with pytest.raises(BowdenfitError, match="gear_ratio") as caught:
         load_dataset(folder_of(tmp_path, currents((45, 90)), MOTOR.replace("26", "-3")))
     assert "2 things are wrong" not in str(caught.value)
+
+
+def test_two_currents_are_signals_of_load_cells_and_not_of_a_motor(tmp_path, run):
+    path = tmp_path / "bench.csv"
+    rows = (f"{i / 100},{8 + i % 50 / 10},{7 + i % 50 / 12}" for i in range(200))
+    path.write_text("time (s),front (mA),rear (mA)\n" + "\n".join(rows) + "\n")
+    _, out, _ = run("check", path)
+    assert "motor" not in out and "input_current" not in out
+    assert "--channel input_force=" in out and "--channel output_force=" in out

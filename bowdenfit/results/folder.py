@@ -327,14 +327,15 @@ def reserve_folder(folder: Path | None) -> Iterator[None]:
 
 
 def remove_empty_results(folder: Path) -> None:
-    """Remove a results folder in which a fit that was ended had written nothing but its lock; any other stays.
+    """Remove a results folder in which a fit that was ended had not yet finished a file; any other stays.
 
     Args:
         folder: The folder, which may be missing, and which nobody writes into meanwhile.
     """
     with suppress(OSError):
-        if not folder.is_symlink() and {path.name for path in folder.iterdir()} == {_LOCK}:
-            (folder / _LOCK).unlink()
+        if not folder.is_symlink() and is_empty(folder):
+            remove_partial(folder)
+            (folder / _LOCK).unlink(missing_ok=True)  # missing where the fit was ended before it held it
             folder.rmdir()
 
 

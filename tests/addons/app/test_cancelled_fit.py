@@ -8,6 +8,7 @@ import pytest
 
 from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import UsageError
+from bowdenfit.results.folder import remove_empty_results
 
 DATASETS = Path(__file__).parents[3] / "datasets"
 
@@ -34,3 +35,25 @@ def test_a_fit_cancelled_before_sampling_leaves_no_folder_and_no_name(tmp_path):
     with pytest.raises(UsageError, match="there is no fit 'yarn'"):
         workbench.results("yarn")
     workbench.close()
+
+
+@pytest.mark.parametrize("left", [(), (".lock",), (".lock", ".chain.checkpoint.1f.partial")])
+def test_a_folder_in_which_a_fit_had_finished_no_file_is_removed(tmp_path, left):
+    folder = _folder_with(tmp_path, left)
+    remove_empty_results(folder)
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("left", [("chain.checkpoint", ".lock"), ("notes.md",)])
+def test_a_folder_that_holds_a_file_stays_as_it_is(tmp_path, left):
+    folder = _folder_with(tmp_path, left)
+    remove_empty_results(folder)
+    assert sorted(path.name for path in folder.iterdir()) == sorted(left)
+
+
+def _folder_with(tmp_path, names):
+    folder = tmp_path / "yarn"
+    folder.mkdir()
+    for name in names:
+        (folder / name).touch()
+    return folder

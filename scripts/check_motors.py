@@ -122,7 +122,7 @@ def describe(bench: dict[str, float], kind: str, rng: np.random.Generator) -> st
 
 
 def inspect_bench(task: tuple[str, int]) -> tuple[str, int, str, bool, str]:
-    """Fit one bench; return its kind and seed, how it ended, whether the interval of mu holds it, and what was message."""
+    """Fit one bench; return its kind and seed, how it ended, whether the interval of mu holds it, and the reasons."""
     import bowdenfit as bf
 
     kind, seed = task

@@ -15,7 +15,7 @@ from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.files.spellings import names_force
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, find_stated_angle, guess_file_kind
 from bowdenfit.kinds.lone_file import WRAP_ANGLE, FileColumn, LoneFile
-from bowdenfit.recordings.forces import likely_clock_unit
+from bowdenfit.recordings.channel_clocks import likely_clock_unit
 from bowdenfit.units import ColumnSource, measures, multiple_of, weight_of
 from bowdenfit.words import listed, shown
 

@@ -26,7 +26,7 @@ from bowdenfit.files.tables import RawTable, list_sheets, read_table
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import FORCES, HEAD, FileKind, guess_file_kind, is_angle_table, read_numbers
 from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels
-from bowdenfit.recordings.forces import clock_in_doubt
+from bowdenfit.recordings.channel_clocks import clock_in_doubt
 from bowdenfit.recordings.named_channels import WANTED, find_channel
 from bowdenfit.types import Vector
 from bowdenfit.units import ColumnSource, dimension_of, is_unit

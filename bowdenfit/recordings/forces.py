@@ -1,4 +1,4 @@
-"""From the channels of a file to a recording: both forces, the velocity, and the clock of each."""
+"""From the channels of a file to a recording: both forces and the velocity, each with its clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,13 +8,13 @@ import numpy as np
 from bowdenfit.description.cable_parts import Pulleys, radius_setting
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.clocks import YEARS, is_clock
+from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.headings import find_candidates, heading_of, option_naming, rank_headings, unit_to_state
 from bowdenfit.files.pieces import have_same_numbers
+from bowdenfit.recordings.channel_clocks import FEW_SAMPLES, check_same_length, sample_times
 from bowdenfit.recordings.named_channels import (
     INSTEAD_OF_FORCES,
     OUTPUT_CLOCK,
-    RATE,
     WANTED,
     converted,
     find_channel,
@@ -25,13 +25,8 @@ from bowdenfit.units import INTERNAL_UNITS, ColumnSource, measures, speed_dimens
 from bowdenfit.words import quoted, shown
 
 _FORCES = ("input_force", "output_force")
-FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
-_CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_CLOCK_WORDS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
 _MOST_TOGETHER, _FEWEST_ROWS = 0.5, 0.9  # shares of rows with both forces, and with one, in a table that joins two clocks
 _LONGEST_NAME = 80  # judged: letters of a channel's name that a message repeats
-_SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
 
 
 def to_recording(
@@ -75,7 +70,7 @@ def to_recording(
     velocity, unit = _velocity(file, by_quantity.get("velocity"), sources.get("velocity"))
     clocks = {q: time for q, (time, _) in read.items()}
     if len(velocity):
-        clocks["velocity"] = _clock(file, by_quantity["velocity"], by_quantity.get("time"), sources.get("time"))
+        clocks["velocity"] = sample_times(file, by_quantity["velocity"], by_quantity.get("time"), sources.get("time"))
     known = {len(clock): clock for clock in clocks.values()}
     clocks = {q: known[len(clock)] if have_same_numbers(known[len(clock)], clock) else clock for q, clock in clocks.items()}
     return (
@@ -154,8 +149,8 @@ def _read_force(
         if quantity == "input_force":
             pulleys.check_input_force(file.path.name)
         force = converted(file, channel, quantity, sources.get(quantity), "force")
-    time = _clock(file, channel, channels.by_quantity.get("time"), sources.get("time"))
-    _same_length(file, channel, force, time)
+    time = sample_times(file, channel, channels.by_quantity.get("time"), sources.get("time"))
+    check_same_length(file, channel, force, time)
     return time, force
 
 
@@ -186,7 +181,8 @@ def _join_files(
     velocity, unit = _velocity(file, of_file.by_quantity.get("velocity"), sources.get("velocity"))
     velocity_time = np.zeros(0)
     if len(velocity):
-        velocity_time = _clock(file, of_file.by_quantity["velocity"], of_file.by_quantity.get("time"), sources.get("time"))
+        time = of_file.by_quantity.get("time")
+        velocity_time = sample_times(file, of_file.by_quantity["velocity"], time, sources.get("time"))
     raw = RawRecording(
         name,
         f"{file.path.name} and {output_file.path.name}",
@@ -341,101 +337,9 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
     )
 
 
-def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: ColumnSource | None) -> np.ndarray:
-    """Return the time of each sample of a channel [s]."""
-    hertz = _rate(file, source)
-    if hertz is not None:
-        return np.arange(len(channel.values)) / hertz
-    if source is None and channel.time is not None:
-        _refuse_clock_without_unit(file, channel)
-        return channel.time
-    if time is not None:
-        return converted(file, time, "time", source, "time")
-    rising = [other.name for other in file.channels if len(other.values) > 1 and np.all(np.diff(other.values) > 0)]
-    by_name = f"name the channel of the time, {option_naming('time', rising[0], 's', '--channel')}, or " if rising else ""
-    raise DatasetError(
-        f"{file.path.name}: the channel {shown(channel.name)} has no clock; {by_name}state the sampling rate, such as "
-        "--channel time=1000Hz."
-    )
-
-
-def _rate(file: ChannelFile, source: ColumnSource | None) -> float | None:
-    """Return the sampling rate that the user gives in the place of a clock [1/s]."""
-    rate = RATE.fullmatch(source.name.strip()) if source is not None else None
-    if rate is None:
-        return None
-    hertz = float(rate["rate"]) * (1000.0 if rate["unit"].lower() == "khz" else 1.0)
-    if not 0 < hertz < np.inf:
-        raise DatasetError(
-            f"{file.path.name}: a sampling rate of {rate[0]} is not possible; it must be above 0, such as time=1000Hz."
-        )
-    return hertz
-
-
-def _same_length(file: ChannelFile, channel: Channel, values: np.ndarray, time: np.ndarray) -> None:
-    if len(values) != len(time):
-        raise DatasetError(
-            f"{file.path.name}: the channel {shown(channel.name)} has {len(values)} samples, but its clock has "
-            f"{len(time)}; name the clock that belongs to it, or state the rate: --channel time=1000Hz."
-        )
-
-
 def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource | None) -> tuple[np.ndarray, str]:
     if channel is None:
         return np.zeros(0), ""
     _, unit = stated_unit(file, channel, "velocity", source)
     kind = speed_dimension(unit)
     return converted(file, channel, "velocity", source, kind), INTERNAL_UNITS[kind]
-
-
-def _read_clock_without_unit(file: ChannelFile, channel: Channel) -> tuple[Channel, float, float] | None:
-    """Return the clock of a channel that says no unit, with its step and its length if these are seconds [s].
-
-    None for any other clock, for one that holds dates, and for few samples.
-    """
-    clock = next((c for c in file.channels if c.name == channel.clock), None)
-    if clock is None or clock.unit or channel.time is None or len(channel.time) < FEW_SAMPLES:
-        return None
-    if np.nanmin(np.abs(clock.values)) >= YEARS:
-        return None
-    return clock, float(np.nanmedian(np.diff(clock.values))), float(np.nanmax(clock.values) - np.nanmin(clock.values))
-
-
-def likely_clock_unit(step: float) -> str:
-    """Return the unit that a clock without one is likely to count in, by its typical step."""
-    return next((unit for unit, factor in _CLOCK_UNITS.items() if step * factor < SLOWEST), "ns")
-
-
-def clock_in_doubt(file: ChannelFile, channel: Channel) -> Channel | None:
-    """Return the clock of a channel where it says no unit and would have the samples seconds apart; None for any other."""
-    clock = _read_clock_without_unit(file, channel)
-    return clock[0] if clock is not None and clock[1] >= SLOWEST else None
-
-
-def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
-    """Refuse a clock that says no unit and is unlikely to be in seconds.
-
-    Raises:
-        DatasetError: By it samples would be seconds apart, or all strokes last less than a second.
-    """
-    if (read := _read_clock_without_unit(file, channel)) is None:
-        return
-    clock, step, length = read
-    if step >= SLOWEST:
-        units = [likely_clock_unit(step), "s"]
-        last = (
-            f"{length / 3600:.2g} hours at one sample each {step:g} s, in {_CLOCK_WORDS[units[0]]} "
-            f"{length * _CLOCK_UNITS[units[0]]:.4g} s"
-        )
-    elif 0 < length < _SHORTEST:
-        units = ["day", "min", "s"]
-        last = (
-            f"{length:.3g} s, in minutes {60 * length:.4g} s, and in days, as spreadsheets count them, {86400 * length:.4g} s"
-        )
-    else:
-        return
-    *options, option = (option_naming("time", clock.name, unit, "--channel") for unit in units)
-    raise DatasetError(
-        f"{file.path.name}: the clock {shown(clock.name)} does not state its unit; in seconds the recording would last {last}. "
-        f"Say which it is: {', '.join(options)}, or {option}."
-    )

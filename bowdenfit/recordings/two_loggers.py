@@ -13,7 +13,7 @@ import numpy as np
 
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
-from bowdenfit.recordings.forces import FEW_SAMPLES
+from bowdenfit.recordings.channel_clocks import FEW_SAMPLES
 from bowdenfit.recordings.preparation import delays_of_parts, inspect_recording
 from bowdenfit.recordings.preparation.checks import check_channels, check_sign
 from bowdenfit.recordings.preparation.delay import Delay

@@ -39,6 +39,7 @@ _MOST_BLOCKS, _STRETCH = 800, 50  # more say no more about a fault; blocks of ea
 _OF_CYCLE = 24  # blocks that thinning leaves of a cycle
 _FEWEST_BLOCKS = 60  # of a recording in which a fault can be told from noise
 _PLACES = np.linspace(0.1, 0.9, 17)  # of the recording, at which a jump is looked for
+_SLIDES = 5  # blocks safely inside sliding phases before a jump, and after it, of which it can be told
 _SCREENED = 0.05  # share of the sum of squares that a fault must explain to first order to be fitted
 _CLEAR = 50.0  # F from which a fault is not taken for noise
 _SHOWN = 20.0  # F from which shorter blocks show crosstalk as well, and creep where something departs from the model
@@ -223,7 +224,9 @@ def find_bench_fault(recording: Recording, *, expects_drag: bool = False, expect
     start = np.array([max(strokes.exponent, 1e-3), strokes.center, 0.0, 0.0, 0.0, 0.0])
     starts = start, start + np.array([0.0, 0.0, _SOME_DRAG, 0.0, 0.0, 0.0])
     usual, cost = min((loop.minimum(s, _USUAL, "none", none) for s in starts), key=lambda fit: fit[1])
-    faults = [fault for kind in ("input_zero", "output_zero", "friction") if (fault := _find_jump(loop, usual, cost, kind))]
+    jumps: tuple[FaultKind, ...] = ("input_zero", "output_zero", "friction")
+    places = _places_between_slides(recording, loop)
+    faults = [fault for kind in jumps if (fault := _find_jump(loop, usual, cost, kind, places))] if len(places) else []
     everywhere = np.ones(len(loop.time))
     if not expects_creep and _screen(loop, usual, "crosstalk", [everywhere])[0] > _SCREENED:
         fit = loop.minimum(usual, (*_USUAL, _SIZE), "crosstalk", everywhere)
@@ -237,7 +240,7 @@ def find_bench_fault(recording: Recording, *, expects_drag: bool = False, expect
         creep = _find_creep(*finest, clearest) if clearest.kind == "crosstalk" else None
         # Blocks safely inside sliding phases give the friction of a rope that creeps little: of ten ropes within 1.2 %.
         return None if creep is not None and abs(creep.exponent / creep.usual_exponent - 1) < _CREPT else clearest
-    return None if expects_drag else _find_drag(loop, usual, cost)
+    return None if expects_drag else _find_drag(loop, usual, cost, start)
 
 
 def shows_creep(recording: Recording) -> bool:
@@ -288,10 +291,22 @@ def _find_creep(loop: _Loop, usual: np.ndarray, cost: float, crosstalk: BenchFau
     return creep if adds < _ADDS and creep.size > _LEAST_CREEP else None
 
 
-def _find_jump(loop: _Loop, usual: np.ndarray, cost: float, kind: FaultKind) -> BenchFault | None:
+def _places_between_slides(recording: Recording, loop: _Loop) -> Vector:
+    """Return the places of the recording at which a jump may be: a rope that only sticks before it or after it shows none.
+
+    There one level of the output alone speaks for the jump, with the noise of the block in which the rope stopped.
+    """
+    slides = recording.blocks.time[recording.strokes.used_sliding]
+    if len(slides) < 2 * _SLIDES:
+        return np.zeros(0)
+    first, last = (slides[[_SLIDES - 1, -_SLIDES]] - loop.time[0]) / np.ptp(loop.time)
+    return _PLACES[(first < _PLACES) & (last > _PLACES)]
+
+
+def _find_jump(loop: _Loop, usual: np.ndarray, cost: float, kind: FaultKind, places: Vector) -> BenchFault | None:
     """Return a jump of one kind that explains more than any gradual change does, and than friction that depends on speed."""
     elapsed = (loop.time - loop.time[0]) / np.ptp(loop.time)
-    steps = [np.where(elapsed > place, 1.0, 0.0) for place in _PLACES]
+    steps = [np.where(elapsed > place, 1.0, 0.0) for place in places]
     gains = _screen(loop, usual, kind, steps)
     best = int(np.argmax(gains))
     if gains[best] < _SCREENED:
@@ -304,16 +319,17 @@ def _find_jump(loop: _Loop, usual: np.ndarray, cost: float, kind: FaultKind) -> 
     trends.append(loop.minimum(usual, (*_USUAL, _SIZE), "friction", loop.log_rate)[1])
     if min(trends) < fits[best][1]:
         return None
-    time = float(loop.time[0] + _PLACES[best] * np.ptp(loop.time))
+    time = float(loop.time[0] + places[best] * np.ptp(loop.time))
     return _make_fault(loop, kind, fits[best], steps[best], time, usual, cost)
 
 
-def _find_drag(loop: _Loop, usual: np.ndarray, cost: float) -> BenchFault | None:
+def _find_drag(loop: _Loop, usual: np.ndarray, cost: float, start: np.ndarray) -> BenchFault | None:
     """Return a drag without which the friction exponent would be another."""
     none = np.zeros(len(loop.time))
     without = usual.copy()
     without[_DRAG] = 0.0
-    plain, plain_cost = loop.minimum(without, (_EXPONENT, _CENTER, _DELAY), "none", none)
+    plain_fits = (loop.minimum(point, (_EXPONENT, _CENTER, _DELAY), "none", none) for point in (without, start))
+    plain, plain_cost = min(plain_fits, key=lambda fit: fit[1])
     significance = loop.significance((usual, cost), "none", none, plain_cost)
     if significance < _CLEAR or abs(plain[_EXPONENT] / usual[_EXPONENT] - 1) < _MOVED:
         return None

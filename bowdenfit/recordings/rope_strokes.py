@@ -28,6 +28,9 @@ from bowdenfit.words import percent
 
 _FIT_BLOCKS = 1000  # more than these say no more about the loop
 _GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
+# Judged: log ratio up to which a loop is centered. One that is not may be that of a rope which all but returns: a loop that is
+# narrower by half of what it lacks, and as far off center, touches the same two forces.
+_CENTERED = 0.005
 _LEAST_EXPONENT = 1e-3  # judged: least friction exponent that a fit starts from
 _LIMITS = np.array([[1e-9, -np.inf, 0.0], [np.inf] * 3])  # of exponent, center and drag
 _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
@@ -37,7 +40,7 @@ _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which 
 _LARGEST_GAIN_ERROR = 0.1  # log ratio that a bad calibration of load cells may add: ten times what their data sheets state
 _WINDOW, _SHARE = 5, 20  # least blocks on both sides over which a force must rise, and one part in so many of the recording
 _SURELY_RISES = 4.0  # standard errors by which it must
-_STICKS = 0.2  # judged: share of the friction exponent by which the input must fall between two pulls
+_STICKS = 0.2  # judged: share of the friction exponent by which the input must fall after a pull
 _STILL = 0.05  # fraction of the highest speed below which the motor is taken to stand
 OPPOSED = -0.5  # judged: correlation below which the forces go against each other
 _FOLLOWS = 0.5  # correlation, and share of the output's variance that friction explains, below both of which it does not
@@ -69,9 +72,11 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
         return _residuals(few_in, few_likely, few_out, (noise_in, noise_out), level, p)
 
     fits = []
-    for start in ([width, center, 0.0025], [width * 0.8, 0.0, 0.09]):
+    never_returns = [max(high, -low, width), 0.0, 0.0025]
+    for start in ([width, center, 0.0025], [width * 0.8, 0.0, 0.09], never_returns):
         fits.append(robust_minimum(model, np.array(start), *_LIMITS))
-        if fits[-1][1] < _COST_OF_NOISE * len(few_in):
+        (_, middle, _), cost = fits[-1]
+        if cost < _COST_OF_NOISE * len(few_in) and abs(middle) < _CENTERED:
             break
     best, cost = min(fits, key=lambda fit: fit[1])
     if cost >= _COST_OF_NOISE * len(few_in):  # a loop whose two branches both lie on one side of a ratio of 1
@@ -147,7 +152,7 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
         velocity: Velocity of the blocks; NaN where it is not known.
     """
     ratio = np.log(loop.force_in / loop.force_out)
-    if RETURN in loop.state or np.median(ratio) <= 0 or _sticks_between_pulls(loop):
+    if RETURN in loop.state or np.median(ratio) <= 0 or _sticks_after_pull(loop):
         return loop.state
     finite = np.isfinite(velocity)
     highest = np.max(np.abs(velocity[finite]), initial=0.0)
@@ -159,17 +164,17 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
     return np.where(moves | (rises & ~finite), PULL, loop.state)
 
 
-def _sticks_between_pulls(loop: Hysteresis) -> bool:
-    """Return whether the rope sticks while the input falls between two pulls, by less than the return takes.
+def _sticks_after_pull(loop: Hysteresis) -> bool:
+    """Return whether the rope sticks while the input falls after a pull, by less than the return takes.
 
     Then the input reverses, and the operator knows where the rope slides: both forces may rise before its band is crossed.
     """
     pulls = np.flatnonzero(loop.state == PULL)
-    if loop.cost >= _COST_OF_NOISE or len(pulls) < 2:
+    if loop.cost >= _COST_OF_NOISE or not len(pulls):
         return False
     likely = np.log(smooth_input(loop.force_in))
-    drops = [likely[a] - likely[a : b + 1].min() for a, b in pairwise(pulls.tolist()) if b > a + 1]
-    return max(drops, default=0.0) > _STICKS * loop.exponent
+    ends = [*pulls.tolist(), len(likely) - 1]
+    return max(likely[a] - likely[a : b + 1].min() for a, b in pairwise(ends)) > _STICKS * loop.exponent
 
 
 def _rises(force: Vector) -> Flags:

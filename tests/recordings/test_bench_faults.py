@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from creeping_rope import Truth, record
 from recorded_benches import RecordedBench, channels, draw_bench, write
+from swinging_rope import swing
 
 import bowdenfit as bf
 from bowdenfit.description import Preparation
@@ -27,7 +28,10 @@ BENCHES = [
 
 def recording(bench, seed=0):
     columns = channels(bench, np.random.default_rng(seed))
-    time, *forces = (columns[name] for name in ("time_s", "input_force_N", "output_force_N"))
+    return read(*(columns[name] for name in ("time_s", "input_force_N", "output_force_N")))
+
+
+def read(time, *forces):
     blocks, account = prepare(RawRecording("s", "s.csv", time, forces[0], time, forces[1]), Preparation())
     return Recording("s", "s.csv", "s", np.nan, NONE, NONE, blocks, find_strokes(blocks, "s.csv", "s"), account)
 
@@ -75,6 +79,18 @@ def test_a_drag_is_named_unless_the_fit_has_one(usual):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_healthy_bench_has_no_fault(usual, seed):
     assert find_bench_fault(recording(RecordedBench(length=60, **usual), seed)) is None
+
+
+@pytest.mark.parametrize(("highest", "exponent", "period"), [(1.5, 0.3, 5.0), (2.0, 0.4, 5.0), (2.0, 0.5, 20.0)])
+@pytest.mark.parametrize("sd", [0.001, 0.005])
+@pytest.mark.parametrize("seed", range(4))
+def test_no_zero_jumps_where_the_rope_only_sticks_before_it_or_after_it(seed, sd, highest, exponent, period):
+    """The level at which the output sticks has the noise of the one block in which the rope stopped."""
+    time = np.arange(0.0, 20.0, 0.01)
+    force, output = swing(time, highest, exponent, period)
+    noise = sd * force.max() * np.random.default_rng(seed).standard_normal((2, len(time)))
+    fault = find_bench_fault(read(time, force + noise[0], output + noise[1]))
+    assert fault is None or "zero" not in fault.kind
 
 
 @pytest.mark.parametrize(("exponent", "crosstalk"), [(0.1, 0.0), (0.3, 0.05)])

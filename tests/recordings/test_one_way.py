@@ -2,6 +2,12 @@
 
 import numpy as np
 import pytest
+from swinging_rope import swing
+
+from bowdenfit.description import Preparation
+from bowdenfit.recordings.preparation import prepare
+from bowdenfit.recordings.recording import RawRecording
+from bowdenfit.recordings.strokes import find_strokes
 
 pytestmark = pytest.mark.extended
 
@@ -92,3 +98,33 @@ def test_an_output_that_much_friction_holds_most_of_the_time_is_not_called_dead(
         output.append(y)
     blocks, computed = used(accept("check", *recorded(force, np.exp(output))))
     assert blocks > 5 and computed == pytest.approx(exponent, rel=0.1)
+
+
+def strokes_of(force, output, sd, seed):
+    """Blocks and strokes of forces with noise, of which the standard deviation is a share of the largest input."""
+    forces = force + noise(seed, sd * force.max()), output + noise(seed + 10, sd * force.max())
+    blocks, _ = prepare(RawRecording("s", "s.csv", TIME, forces[0], TIME, forces[1]), Preparation())
+    return blocks, find_strokes(blocks, "s.csv", "s")
+
+
+SWINGS = [(1.5, 0.3, 5.0), (2.0, 0.5, 5.0), (3.0, 0.8, 20.0)]  # highest over lowest input, exponent, period [s]
+
+
+@pytest.mark.parametrize(("highest", "exponent", "period"), SWINGS)
+@pytest.mark.parametrize("seed", [3, 4, 8, 9])
+def test_a_rope_that_pulls_once_and_then_sticks_is_not_pulling_while_it_sticks(seed, highest, exponent, period):
+    """Its input swings too little for a return: the band of friction is wider than the swing."""
+    force, output = swing(TIME, highest, exponent, period)
+    blocks, strokes = strokes_of(force, output, 0.005, seed)
+    slides = np.interp(blocks.time, TIME, np.gradient(output, TIME)) != 0
+    used = strokes.used_sliding
+    assert used.any() and np.mean(slides[used]) > 0.85
+    assert strokes.exponent == pytest.approx(exponent, rel=0.02)
+
+
+@pytest.mark.parametrize(("highest", "exponent", "seed"), [(1.5, 0.3, 7), (2.0, 0.37, 5), (1.5, 0.25, 12)])
+def test_a_rope_that_all_but_returns_is_not_off_center(seed, highest, exponent):
+    """A loop that is narrower, and off center by what that leaves, touches the same two forces."""
+    strokes = strokes_of(*swing(TIME, highest, exponent, 20.0), 0.003, seed)[1]
+    assert strokes.center == pytest.approx(0, abs=0.01)
+    assert strokes.exponent == pytest.approx(exponent, rel=0.02)

@@ -81,7 +81,8 @@ def loop_input_force(
     along = stroke * output_force
     preload = moving_preload(along, preload, -friction_exponent, rope)  # as seen from the load side
     slack = along * jnp.where(along > 0, jnp.exp(friction_exponent), jnp.exp(-friction_exponent))
-    return stroke * jnp.maximum(along + 2 * preload * friction_exponent, slack)
+    taut = along + 2 * preload * friction_exponent
+    return stroke * jnp.where(taut > slack, taut, slack)  # see `loop_response_from`
 
 
 def loop_band(
@@ -202,7 +203,8 @@ def loop_response_from(
     taut, slack = along - taut_loss, along * growth
     is_taut = taut < slack
     by_exponent = jnp.where(is_taut, twice_preload, jnp.abs(slack))
-    return stroke * jnp.minimum(taut, slack), jnp.where(is_taut, 1.0, growth), -stroke * by_exponent
+    # The derivative of jnp.minimum asks which argument equals it, and compiled code that rounds the two otherwise finds none.
+    return stroke * jnp.where(is_taut, taut, slack), jnp.where(is_taut, 1.0, growth), -stroke * by_exponent
 
 
 def free_motion_loss(

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.physics.friction import capstan_output_force, play_operator
 from bowdenfit.physics.loop import (
     free_motion_loss,
@@ -349,6 +350,18 @@ def test_a_rope_that_hardly_beds_in_is_a_linear_one():
     rope = (stiffness, 1e-12 * load / stiffness, load)
     output = loop_output_force(along, preload, exponent, FORWARD, rope)
     np.testing.assert_allclose(output, loop_output_force(along, preload, exponent, FORWARD), atol=1e-9 * np.max(along))
+
+
+@pytest.mark.parametrize("options", [{}, {"run_once": True}, {"run_often": True}])
+def test_a_compiled_loop_has_its_slope_on_every_branch(options):
+    """At no optimization XLA rounds a branch and the smaller of both in two ways, so that neither seems to be the smaller."""
+    force, exponents = jnp.linspace(-60, 60, 2001)[:, None], jnp.asarray([0.18, 0.37, 0.38, 0.57])
+
+    def slopes(exponents):
+        return jax.jvp(lambda e: loop_band(force, jnp.full(4, 20.006), e), (exponents,), (jnp.ones(4),))[1]
+
+    compiled = compile_program(slopes, jax.ShapeDtypeStruct((4,), float), **options)(exponents)
+    np.testing.assert_allclose(compiled, slopes(exponents), atol=1e-9)
 
 
 @pytest.mark.parametrize("stroke", [1.0, -1.0])

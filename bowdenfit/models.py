@@ -35,6 +35,8 @@ from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.parameters.symbols import make_symbol
 from bowdenfit.words import listed
 
+_WEIGHTS = ("weight", "log_sd")  # arrays of terms that weigh readings by forces or efficiencies
+
 
 @dataclass(frozen=True, repr=False)
 class Model(Display):
@@ -61,7 +63,7 @@ class Model(Display):
         tables = {kind.name: kind.with_bench_error(table, error) for kind, table in iterate_tables(self.measurements)}
         angles = Measurements(tuple(tables.values())).table(AngleTable)
         changed: list[Any] = [t for name, table in tables.items() for t in TERMS[name].terms(self.cable, table, angles)]
-        terms = [_in_same_cells(term, other) for term, other in zip(self.terms, changed, strict=True)]
+        terms = [_weighed_alike(term, other) for term, other in zip(self.terms, changed, strict=True)]
         return tuple(replace(term, data=_with_constant_angles(term.data, self.cable, error)) for term in terms)
 
     def sentences(self) -> list[str]:
@@ -92,9 +94,12 @@ def build_model(dataset: Dataset) -> Model:
     return Model(cable, space, tuple(terms), places, measurements)
 
 
-def _in_same_cells(term: Any, changed: Any) -> Any:
-    """Return a changed term whose readings are in the cells of the original: equal loads may differ by an error."""
-    return term.with_rows(changed.rows) if isinstance(term, RunsTerm) and changed.rows is not None else changed
+def _weighed_alike(term: Any, changed: Any) -> Any:
+    """Return a changed term with cells and weights of the original: an error moves readings, and their noise stays as it is."""
+    if isinstance(term, RunsTerm) and changed.rows is not None:
+        return term.with_rows(changed.rows)
+    weights = {name: getattr(term.data, name) for name in _WEIGHTS if hasattr(term.data, name)}
+    return replace(changed, data=replace(changed.data, **weights))
 
 
 def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) -> Any:

@@ -84,6 +84,34 @@ class BenchError:
         ratio = np.where(taut, output_force / np.where(taut, input_force, 1.0), 1.0)
         return np.where(taut, input_force * ratio**factor, output_force)
 
+    def apply_to_rope(
+        self,
+        forces: tuple[Vector, Vector],
+        log_ratio: Vector,
+        stroke: Labels,
+        order: Vector | float,
+        largest: tuple[float, float],
+    ) -> tuple[Vector, Vector]:
+        """Return input and output forces [N] of a single rope as the bench would read them; their noise is not of the bench.
+
+        An error that is calculated from a noisy reading scales its noise too. Where the error itself does not show, as wear
+        inside a run, that would be all that the readings say of it, and more with each of them.
+
+        Args:
+            forces: Input and output force as they were read [N].
+            log_ratio: log(F_in/F_out) to which friction had taken each reading when the rope last slid, without noise [1].
+            stroke: +1 pulling, -1 returning, 0 where it sticks.
+            order: When each was read, from -0.5 for the first to 0.5 for the last.
+            largest: Largest force that each cell read [N].
+        """
+        input_force, output_force = forces
+        taut = (input_force > 0) & (output_force > 0)
+        slid = np.where(taut, input_force * np.exp(-log_ratio), output_force)
+        likely = np.where(stroke != 0, slid, output_force)
+        worn = likely * np.where(taut, self.apply_to_friction(input_force, slid, order) / np.where(taut, slid, 1.0), 1.0)
+        read_input, read_output = self.apply_to_cells(input_force, worn, stroke, largest)
+        return read_input, np.where(taut, output_force * read_output / np.where(taut, likely, 1.0), read_output)
+
     def apply_to_angles(self, angle: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
         """Return wrap angles [rad] as the bench would read them; an angle of 0, and one that is not known, stays."""
         return np.where(angle > 0, angle * (1 + self.angle_scale) + self.angle_offset, angle)

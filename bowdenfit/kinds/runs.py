@@ -150,7 +150,10 @@ class RunsTerm:
     cell_rows: SlidingRows | None = field(default=None, repr=False)
 
     def with_rows(self, rows: SlidingRows) -> "RunsTerm":
-        """Return the term of the same readings with other forces or angles, sorted into the same cells."""
+        """Return the term of the same readings with other forces or angles, in the same cells and with the same weights."""
+        assert self.rows is not None
+        weight, n_effective = self.rows.weight(self.cable.description.sensors.noise_ratio), self.rows.n_effective
+        rows = replace(rows, n_effective=n_effective, information=weight / n_effective)
         return replace(self, data=sum_runs(self.cable, rows, self.rows), rows=rows, cell_rows=self.rows)
 
     @property

@@ -4,12 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from recorded_benches import RecordedBench, write
 from scipy import stats
 
 import bowdenfit as bf
+from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.bench_errors import LearnedErrors
 from bowdenfit.kinds.bench_error import BenchError, ErrorSource, iterate_error_sources, order_of
+from bowdenfit.kinds.recordings.kind import RecordingKind
+from bowdenfit.models import build_model
 from bowdenfit.questions.error_budget import with_bench_errors
+from bowdenfit.recordings.recording import Recordings
 
 MU, LOADS = 0.15, (20.0, 40.0, 80.0, 120.0)
 
@@ -152,3 +157,73 @@ def test_wear_and_load_scale_the_loss():
     assert worn[2] == 0
     loaded = BenchError(load_exponent=0.1).apply_to_friction(np.array([50.0, 100.0, 200.0]), np.array([25.0, 50.0, 100.0]))
     assert np.log(np.array([50.0, 100.0, 200.0]) / loaded) == pytest.approx(np.log(2) * 2.0 ** np.array([-0.1, 0, 0.1]))
+
+
+@pytest.mark.parametrize("kind", ["wear", "load_exponent", "crosstalk", "gain", "hysteresis"])
+def test_an_error_moves_readings_of_a_rope_and_not_their_noise(kind):
+    error, forces = BenchError(**{kind: 0.1}), (np.array([100.0, 100.0, 100.0]), np.array([50.0, 55.0, 45.0]))
+    slides, largest = np.ones(3, dtype=int), (200.0, 100.0)
+    read = error.apply_to_rope(forces, np.full(3, np.log(2)), slides, 0.25, largest)
+    assert np.ptp(np.log(read[1] / forces[1])) == pytest.approx(0, abs=1e-12)
+    exact = error.apply_to_rope((forces[0], np.full(3, 50.0)), np.full(3, np.log(2)), slides, 0.25, largest)
+    assert read[1][0] == exact[1][0]
+
+
+def table(path, counts, strokes, noise=0.3):
+    """Write a healthy sweep of mountings with so many readings each, of which so large a share are pulls."""
+    rng, rows = np.random.default_rng(7), ["run,stroke,input_force_N,output_force_N,wrap_angle_deg"]
+    for number, count in enumerate(counts):
+        bend = 30 + 240 * number / (len(counts) - 1)
+        loss = MU * np.radians(bend) + rng.normal(0, 0.006)
+        for _ in range(count):
+            stroke, load = 1 if rng.random() < strokes else -1, 100 * rng.uniform(0.2, 1)
+            read = load + rng.normal(0, noise), load * np.exp(-stroke * loss) + rng.normal(0, noise)
+            rows.append(f"m{number},{'pull' if stroke > 0 else 'return'},{read[0]:.4f},{read[1]:.4f},{bend:.1f}")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def describe(folder, path):
+    (folder / "cable.toml").write_text(
+        'schema = 1\nname = "bench"\n[[contact]]\nname = "cable"\nfriction = "mu"\nwrap_angle = { column = "wrap_angle" }\n'
+        f'[tables]\nforces = {{ file = "{path.name}" }}\n'
+    )
+    return folder
+
+
+def test_the_noise_of_many_readings_in_few_mountings_is_not_taken_for_an_error(tmp_path):
+    """The earlier mountings and the pull have more readings, whose noise would stand for wear and for hysteresis."""
+    fit = bf.fit(table(tmp_path / "bench.csv", (150, 120, 60, 20, 10, 6), 0.8), seed=1)
+    interval = fit.error_budget.row("mu").bench
+    assert interval.q05 < MU < interval.q95
+    for error in fit.error_budget.learned:  # 8 errors: all of 200 healthy benches of 250
+        scatter = math.sqrt(max(error.limit_sd**2 - error.sd**2, 0.0))
+        assert abs(error.mean) < 3 * scatter + 0.02 * error.limit_sd, str(error)
+
+
+def test_a_crosstalk_that_looks_like_friction_is_not_learned_from_noise(tmp_path):
+    """Pulls alone, each in a mounting of its own: what crosstalk adds is a change of the friction coefficient."""
+    path = table(tmp_path / "bench.csv", (1,) * 100, 1.0)
+    fit = bf.fit(path, seed=1, settings=["errors.crosstalk=0.05"])
+    crosstalk, interval = learned(fit, "share of the input force"), fit.error_budget.row("mu").bench
+    assert interval.q05 < MU < interval.q95
+    assert abs(crosstalk.mean) < 3 * math.sqrt(crosstalk.limit_sd**2 - crosstalk.sd**2)
+
+
+def test_readings_keep_their_weights_and_cells_in_a_bench_with_an_error(tmp_path):
+    model = build_model(load_dataset(describe(tmp_path, table(tmp_path / "bench.csv", (6, 4, 2), 0.5))))
+    (term,), (changed,) = model.terms, model.terms_with_error(BenchError(gain=0.1))
+    assert np.array_equal(term.data.cells.weight, changed.data.cells.weight)
+    assert not np.array_equal(term.data.cells.mean, changed.data.cells.mean)
+
+
+def test_wear_moves_all_blocks_of_a_stroke_alike(tmp_path):
+    path = write(RecordedBench(length=30, rate=100, mountings=2), tmp_path / "bench", 1)
+    recordings = load_dataset(path).measurements.table(Recordings)
+    worn = RecordingKind().with_bench_error(recordings, BenchError(wear=0.2))
+    for before, after, factor in zip(recordings.items, worn.items, (0.9, 1.1), strict=True):
+        change = np.log(after.blocks.output_force / before.blocks.output_force)
+        for stroke in (1, -1):
+            blocks = before.strokes.contact == stroke
+            assert change[blocks] == pytest.approx(-stroke * (factor - 1) * before.strokes.exponent, abs=0.002)
+            assert np.ptp(change[blocks]) < 1e-12

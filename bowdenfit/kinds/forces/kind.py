@@ -38,6 +38,7 @@ from bowdenfit.kinds.rows import (
     Stroke,
     convert_to_radians,
     format_fixed,
+    number_names,
     route_cells,
     route_heading,
     stroke_signs,
@@ -213,11 +214,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     @override
     def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:
         """Return the table with the error in its forces and wrap angles."""
-        order = order_of(table.run, len(table.run_names))
-        worn = error.apply_to_friction(table.input_force, table.output_force, order)
-        forces = table.input_force, np.where(table.stroke != 0, worn, table.output_force)
+        forces, order = (table.input_force, table.output_force), order_of(table.run, len(table.run_names))
         largest = float(table.input_force.max()), float(table.output_force.max())
-        input_force, output_force = error.apply_to_cells(*forces, table.stroke, largest)
+        input_force, output_force = error.apply_to_rope(forces, _smooth_log_ratio(table), table.stroke, order, largest)
         return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override
@@ -328,3 +327,23 @@ def _warn_of_single_mountings(table: ForceTable, description: Description) -> li
         "mounting cannot be separated from that of the group, and intervals rest on the scatter of other mountings, or on its "
         "prior; remount the cable a few times in each group."
     ]
+
+
+def _smooth_log_ratio(table: ForceTable) -> Vector:
+    """Return the log ratio of input to output force that rows like each one have [1]; 0 for held rows.
+
+    By least squares over all rows of a stroke and group: linear in wrap angles and log load, and cubic in the route variable.
+    """
+    slides = (table.stroke != 0) & (table.input_force > 0) & (table.output_force > 0)
+    ratio = np.zeros(len(slides))
+    ratio[slides] = np.log(table.input_force[slides] / table.output_force[slides])
+    load = np.log(np.where(slides, table.input_force, 1.0))
+    route = np.nan_to_num(table.route) / max(float(np.max(np.abs(np.nan_to_num(table.route)), initial=0.0)), 1e-300)
+    columns = np.column_stack([np.vander(route, 4), np.nan_to_num(table.own.angle), load])
+    group = number_names(table.group)[0] if table.group else np.zeros(len(slides), dtype=int)
+    for key in np.unique(np.column_stack([group, table.stroke])[slides], axis=0):
+        rows = slides & (group == key[0]) & (table.stroke == key[1])
+        weight = table.input_force[rows]  # noise of a log ratio is that of the cells over their force
+        coefficients = np.linalg.lstsq(columns[rows] * weight[:, None], ratio[rows] * weight, rcond=None)[0]
+        ratio[rows] = columns[rows] @ coefficients
+    return ratio

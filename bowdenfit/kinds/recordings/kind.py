@@ -19,6 +19,7 @@ from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.recordings.bench_faults import BenchFault, describe_bench_fault, find_bench_fault
+from bowdenfit.recordings.preparation.hysteresis import last_contact
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Recording, Recordings
 from bowdenfit.recordings.rope_strokes import describe_off_center
 from bowdenfit.types import Vector
@@ -322,12 +323,15 @@ class RecordingKind(FrictionKind[Recordings]):
         largest = float(max(of_input)), float(max(of_output))
         items, order = [], order_of(np.array([table.runs.index(recording.run) for recording in table.items]), len(table.runs))
         for recording, late in zip(table.items, order, strict=True):
-            blocks, force = recording.blocks, recording.blocks.output_force
-            if not table.loop:
-                force = error.apply_to_friction(blocks.input_force, force, late)
-            input_force, force = error.apply_to_cells(blocks.input_force, force, recording.strokes.contact, largest)
+            blocks, strokes = recording.blocks, recording.strokes
+            forces = blocks.input_force, blocks.output_force
+            if table.loop:
+                input_force, output_force = error.apply_to_cells(*forces, strokes.contact, largest)
+            else:
+                log_ratio = strokes.center + last_contact(strokes.contact) * strokes.exponent
+                input_force, output_force = error.apply_to_rope(forces, log_ratio, strokes.contact, late, largest)
             angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
-            read = replace(blocks, input_force=input_force, output_force=force, finer=None)
+            read = replace(blocks, input_force=input_force, output_force=output_force, finer=None)
             items.append(replace(recording, own_angle=angle, blocks=read))
         return replace(table, items=tuple(items))
 

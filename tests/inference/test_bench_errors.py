@@ -221,9 +221,9 @@ def test_wear_moves_all_blocks_of_a_stroke_alike(tmp_path):
     path = write(RecordedBench(length=30, rate=100, mountings=2), tmp_path / "bench", 1)
     recordings = load_dataset(path).measurements.table(Recordings)
     worn = RecordingKind().with_bench_error(recordings, BenchError(wear=0.2))
-    for before, after, factor in zip(recordings.items, worn.items, (0.9, 1.1), strict=True):
-        change = np.log(after.blocks.output_force / before.blocks.output_force)
+    for healthy, changed, factor in zip(recordings.items, worn.items, (0.9, 1.1), strict=True):
+        change = np.log(changed.blocks.output_force / healthy.blocks.output_force)
         for stroke in (1, -1):
-            blocks = before.strokes.contact == stroke
-            assert change[blocks] == pytest.approx(-stroke * (factor - 1) * before.strokes.exponent, abs=0.002)
+            blocks = healthy.strokes.contact == stroke
+            assert change[blocks] == pytest.approx(-stroke * (factor - 1) * healthy.strokes.exponent, abs=0.002)
             assert np.ptp(change[blocks]) < 1e-12

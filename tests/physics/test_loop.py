@@ -355,13 +355,14 @@ def test_a_rope_that_hardly_beds_in_is_a_linear_one():
 @pytest.mark.parametrize("options", [{}, {"run_once": True}, {"run_often": True}])
 def test_a_compiled_loop_has_its_slope_on_every_branch(options):
     """At no optimization XLA rounds a branch and the smaller of both in two ways, so that neither seems to be the smaller."""
-    force, exponents = jnp.linspace(-60, 60, 2001)[:, None], jnp.asarray([0.18, 0.37, 0.38, 0.57])
+    force, exponents = jnp.linspace(-60, 60, 2001)[:, None] * jnp.ones((1, 4)), jnp.asarray([0.18, 0.37, 0.38, 0.57])
+    preload = jnp.full(4, 20.006)
 
-    def slopes(exponents):
-        return jax.jvp(lambda e: loop_band(force, jnp.full(4, 20.006), e), (exponents,), (jnp.ones(4),))[1]
+    def band_and_slopes(exponents):
+        return jax.jvp(lambda e: loop_band(force, preload, e), (exponents,), (jnp.ones_like(exponents),))
 
-    compiled = compile_program(slopes, jax.ShapeDtypeStruct((4,), float), **options)(exponents)
-    np.testing.assert_allclose(compiled, slopes(exponents), atol=1e-9)
+    compiled = compile_program(band_and_slopes, jax.ShapeDtypeStruct((4,), float), **options)(exponents)
+    np.testing.assert_allclose(compiled[1], band_and_slopes(exponents)[1], atol=1e-9)
 
 
 @pytest.mark.parametrize("stroke", [1.0, -1.0])

@@ -183,14 +183,6 @@ def table(path, counts, strokes, noise=0.3):
     return path
 
 
-def describe(folder, path):
-    (folder / "cable.toml").write_text(
-        'schema = 1\nname = "bench"\n[[contact]]\nname = "cable"\nfriction = "mu"\nwrap_angle = { column = "wrap_angle" }\n'
-        f'[tables]\nforces = {{ file = "{path.name}" }}\n'
-    )
-    return folder
-
-
 def assert_nothing_learned_from_noise(fit):
     """No error beyond 3 standard deviations of what healthy readings say of it: of 9 errors in 2 benches of 100."""
     interval = fit.error_budget.row("mu").bench
@@ -213,7 +205,7 @@ def test_a_crosstalk_that_looks_like_friction_is_not_learned_from_noise(tmp_path
 
 
 def test_readings_keep_their_weights_and_cells_in_a_bench_with_an_error(tmp_path):
-    model = build_model(load_dataset(describe(tmp_path, table(tmp_path / "bench.csv", (6, 4, 2), 0.5))))
+    model = build_model(bf.read(table(tmp_path / "bench.csv", (6, 4, 2), 0.5)))
     (term,), (changed,) = model.terms, model.terms_with_error(BenchError(gain=0.1))
     assert np.array_equal(term.data.cells.weight, changed.data.cells.weight)
     assert not np.array_equal(term.data.cells.mean, changed.data.cells.mean)

@@ -279,13 +279,16 @@ def check_spelling(table: RawTable, columns: Mapping[str, Column], optional: Seq
                 )
 
 
-def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
+def find_end_column(
+    table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False, has_motor: bool = False
+) -> Column:
     """Return the column of one end, "input" or "output": of its force, or of a torque or a current instead.
 
     Args:
         table, columns: Where it is looked for.
         end: Which end.
         is_loop: Whether torques are as usual as forces, so that both are named where there are none.
+        has_motor: Whether a motor takes the place of a load cell there, whose current or torque is then named.
 
     Raises:
         DatasetError: There is none, or there are several.
@@ -294,6 +297,8 @@ def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *,
     several = [name for name in (force, *instead) if name in columns]
     if len(several) > 1:
         raise DatasetError(f"{table.file} has both {several[0]} and {several[1]}; leave one of the two columns out.")
+    if has_motor and not several:
+        return require_column(table, columns, f"{end}_current", f"{end}_current_A or {end}_torque_N_m")
     named = f"{force}_N or {end}_torque_N_m" if is_loop else f"{force}_N"
     return columns[instead[0]] if instead else require_column(table, columns, force, named)
 
@@ -313,7 +318,7 @@ def convert_to_forces(
         DatasetError: They are torques or currents, and the radius of that pulley, or the motor, is not stated.
     """
     quantity = next((name for name in _other_readings(end) if name in columns), None)
-    if quantity is None and end == "input":
+    if quantity is None and end == "input" and "input_force" in columns:
         description.pulleys.check_input_force(table.file)
     forces = values if quantity is None else description.pulleys.forces(values, quantity, table.file)
     return forces * description.sensors.ratio(end)

@@ -296,8 +296,8 @@ def _describe_conditions(route: Vector, own: OwnAngles, unit: str) -> list[str]:
 
 def _read_tensions(table: RawTable, columns: Mapping[str, Column], description: Description, end: str) -> Vector:
     """Return the tensions at one end [N], from its forces, or from its torques or currents."""
-    column = find_end_column(table, columns, end)
     is_motor = end == "input" and description.motor is not None
+    column = find_end_column(table, columns, end, has_motor=is_motor)
     values = np.array(column.read_cells(partial(_read_force, column, is_motor), np.nan))
     return convert_to_forces(values, table, columns, end, description)
 

@@ -62,6 +62,7 @@ def test_intervals_contain_the_cable_at_one_bend_only_as_well_as_the_gear_is_sta
         ((90, 180), {"motor": "[motor]\n"}, r"nothing says what torque a current makes"),
         ((90, 180), {"cable": ""}, r"\[motor\] needs the radius of its pulley"),
         ((90, 180), {"heading": "input_force_N"}, r"has a \[motor\], which takes the place of one"),
+        ((90, 180), {"heading": "motor"}, r"has no column input_current;.*Name the column input_current_A or input_torque_N_m"),
         ((90, 180), {"heading": "input_current_N"}, "current"),
         ((90, 180), {"motor": MOTOR + "gear_efficiency = 80\n"}, "write 0.8 for 80 %"),
         ((90, 180), {"motor": MOTOR + 'gear_friction = { value = 0.1, unit = "N" }\n'}, "does not measure a torque"),

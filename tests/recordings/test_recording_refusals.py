@@ -362,6 +362,14 @@ DESCRIPTIONS = [
     ([('"whole"', '"hole"')], ["tables.recordings.likelihood", "'runs' or 'whole'", "'hole'"]),
     (with_key('wrap_angles = { angel = { value = 9, unit = "deg" } }'), ["'run.csv'", "'angel'", "'angle'?"]),
     (with_key('wrap_angles = { angle = { value = 9, unit = "mm" } }'), ["'run.csv'", "wrap_angles, angle", "'mm'"]),
+    (
+        [
+            *with_key('wrap_angles = { angle = { value = 9, unit = "deg" } }'),
+            ('{ curve = "gaussian", column = "angle" }', '{ value = 90, unit = "deg" }'),
+            ('angles = { file = "angles.csv" }\n', ""),
+        ],
+        ["'angle' is not a column", "give its contact wrap_angle = { column = 'angle' }"],
+    ),
     ([("at = 470", "")], ["'run'", "at which cable_length", "at = 470", "pattern"]),
     (
         [('curve = "gaussian", ', ""), ('angles = { file = "angles.csv" }\n', "")],

@@ -355,9 +355,11 @@ def _stated_angles(description: Description, entry: RecordingFile) -> tuple[np.n
     columns = description.angle_columns
     for name in entry.wrap_angles:
         if name not in columns:
+            in_contact = f"; give its contact wrap_angle = {{ column = {name!r} }} in the place of a constant angle."
+            remedy = suggest_name(name, columns) if columns else in_contact
             raise DescriptionError(
                 f"cable.toml, recording {entry.file!r}, wrap_angles: {name!r} is not a column of a contact's wrap angle"
-                f"{suggest_name(name, columns)}"
+                f"{remedy}"
             )
     stated = [entry.wrap_angles.get(name) for name in columns]
     angles = [float("nan") if q is None else q.to("angle") for q in stated]

@@ -82,10 +82,8 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
     "friction": "friction_model",
     "noise": "noise",
 }
-_NO_ERRORS = (
-    "errors.angle={value=0,unit='deg'}",
-    *(f"errors.{name}=0" for name in ("angle_scale", "crosstalk", "gain", "hysteresis", "load_exponent", "wear", "zero")),
-)
+_ERRORS = ("angle_scale", "compression", "crosstalk", "gain", "hysteresis", "load_exponent", "wear", "zero")
+_NO_ERRORS = ("errors.angle={value=0,unit='deg'}", *(f"errors.{name}=0" for name in _ERRORS))
 
 
 @read_first

@@ -56,7 +56,7 @@ LARGE_FAULTS: dict[str, tuple[Fault, tuple[str, ...]]] = {
     "gain 3 % off": (lambda rng: {"gain_out": sign(rng) * 0.03}, ("gain=0.04",)),
     "hysteresis 1 and 1.5 %": (lambda _: {"hysteresis_in": 0.01, "hysteresis_out": 0.015}, ("hysteresis=0.02",)),
     "wear 12 %": (lambda rng: {"wear": sign(rng) * 0.12}, ("wear=0.15",)),
-    "compression 6 %": (lambda _: {"softening": -0.06}, ("angle_scale=0.08", "load_exponent=0.08")),
+    "compression 6 %": (lambda _: {"softening": -0.06}, ("compression=0.08",)),
     "load exponent 0.9": (lambda _: {"exponent": -0.1}, ("load_exponent=0.12",)),
 }
 

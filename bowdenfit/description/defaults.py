@@ -98,13 +98,15 @@ class BenchErrors(Frozen):
     The usual limits are those of a class 1 force measurement (ISO 7500-1: +-1 % of accuracy, 1.5 % of reversibility, 0.1 % of
     zero), and of a goniometer, whose readings of one bend differ from photographs by 2.4 to 3.4 deg, one standard deviation
     (Fish and Wingate, Physical Therapy 65 (1985), 1666); 3 % is the same of the bends of 90 to 180 deg that most cables have.
-    Those of wear and load exponent are judgements; so is that load cells share no signal, which is stated as crosstalk.
+    Those of wear, load exponent and compression are judgements; so is that load cells share no signal, which is stated as
+    crosstalk.
     """
 
     gain: NonNegative = 0.01
     hysteresis: NonNegative = 0.015
     wear: NonNegative = 0.05
     load_exponent: NonNegative = 0.03
+    compression: NonNegative = 0.03
     angle: QuantityValue = QuantityValue(value=3, unit="deg")
     angle_scale: NonNegative = 0.03
     zero: NonNegative = 0.001

@@ -17,6 +17,28 @@ STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, larg
 
 
 @dataclass(frozen=True)
+class BenchLoads:
+    """Loads of all readings of a table, to which errors of its bench refer.
+
+    Args:
+        input_force, output_force: Largest force that each load cell read [N].
+        middle, largest: Median and largest tension of the readings, each the geometric mean of both forces [N].
+    """
+
+    input_force: float
+    output_force: float
+    middle: float
+    largest: float
+
+    @classmethod
+    def of(cls, input_force: Vector, output_force: Vector) -> "BenchLoads":
+        """Return those of the forces that were read [N]; for efficiencies the input force is 1."""
+        tensions = np.sqrt((input_force * output_force)[(input_force > 0) & (output_force > 0)])
+        middle, largest = (float(np.median(tensions)), float(tensions.max())) if len(tensions) else (1.0, 1.0)
+        return cls(float(np.abs(input_force).max()), float(np.abs(output_force).max()), middle, largest)
+
+
+@dataclass(frozen=True)
 class BenchError:
     """An error that all readings of a bench share.
 
@@ -28,6 +50,7 @@ class BenchError:
         angle_offset: Error that all wrap angles share [rad].
         wear: Change of friction from the first mounting, or row, to the last, relative to its middle [1].
         load_exponent: Exponent by which friction grows with the load, beyond the model's; none at the middle load [1].
+        compression: Growth of all wrap angles, and with them of friction, from no load to the largest [1].
         input_zero, output_zero: What a load cell reads without a load, relative to the largest force that it read [1].
         crosstalk: Share of the input force that the output's reading holds [1].
     """
@@ -38,6 +61,7 @@ class BenchError:
     angle_offset: float = 0.0
     wear: float = 0.0
     load_exponent: float = 0.0
+    compression: float = 0.0
     input_zero: float = 0.0
     output_zero: float = 0.0
     crosstalk: float = 0.0
@@ -58,31 +82,34 @@ class BenchError:
         return output_force * (1 + self.gain) * (1 - self.hysteresis * np.asarray(stroke) / 2)
 
     def apply_to_cells(
-        self, input_force: Vector, output_force: Vector, stroke: Vector | Labels, largest: tuple[float, float]
+        self, input_force: Vector, output_force: Vector, stroke: Vector | Labels, loads: BenchLoads
     ) -> tuple[Vector, Vector]:
         """Return input and output forces [N] as the bench would read them.
 
         Args:
             input_force, output_force: As they were read.
             stroke: +1 pulling, -1 returning, 0 neither.
-            largest: Largest force that each cell read [N].
+            loads: Loads of the whole table.
         """
         output = self.apply_to_force(output_force + self.crosstalk * input_force, stroke)
-        return input_force + self.input_zero * largest[0], output + self.output_zero * largest[1]
+        return input_force + self.input_zero * loads.input_force, output + self.output_zero * loads.output_force
 
-    def apply_to_friction(self, input_force: Vector | float, output_force: Vector, order: Vector | float = 0.0) -> Vector:
+    def apply_to_friction(
+        self, input_force: Vector, output_force: Vector, loads: BenchLoads, order: Vector | float = 0.0
+    ) -> Vector:
         """Return output forces of sliding readings as friction would make them that is worn, or depends on the load.
 
         Args:
             input_force: Input force [N], or 1 for efficiencies.
             output_force: Output force [N], or efficiency.
+            loads: Loads of the whole table.
             order: When each was read, from -0.5 for the first to 0.5 for the last.
         """
-        load = 0.5 * np.log(np.maximum(input_force * output_force, 1e-300))
-        factor = (1 + self.wear * np.asarray(order)) * np.exp(self.load_exponent * (load - np.median(load)))
-        taut = (output_force > 0) & (np.asarray(input_force) > 0)
+        taut = (output_force > 0) & (input_force > 0)
+        tension = np.sqrt(np.where(taut, input_force * output_force, loads.middle**2))
+        of_load = (tension / loads.middle) ** self.load_exponent * (1 + self.compression * tension / loads.largest)
         ratio = np.where(taut, output_force / np.where(taut, input_force, 1.0), 1.0)
-        return np.where(taut, input_force * ratio**factor, output_force)
+        return np.where(taut, input_force * ratio ** (of_load * (1 + self.wear * np.asarray(order))), output_force)
 
     def apply_to_rope(
         self,
@@ -90,7 +117,7 @@ class BenchError:
         log_ratio: Vector,
         stroke: Labels,
         order: Vector | float,
-        largest: tuple[float, float],
+        loads: BenchLoads,
     ) -> tuple[Vector, Vector]:
         """Return input and output forces [N] of a single rope as the bench would read them; their noise is not of the bench.
 
@@ -102,14 +129,15 @@ class BenchError:
             log_ratio: log(F_in/F_out) to which friction had taken each reading when the rope last slid, without noise [1].
             stroke: +1 pulling, -1 returning, 0 where it sticks.
             order: When each was read, from -0.5 for the first to 0.5 for the last.
-            largest: Largest force that each cell read [N].
+            loads: Loads of the whole table.
         """
         input_force, output_force = forces
         taut = (input_force > 0) & (output_force > 0)
         slid = np.where(taut, input_force * np.exp(-log_ratio), output_force)
         likely = np.where(stroke != 0, slid, output_force)
-        worn = likely * np.where(taut, self.apply_to_friction(input_force, slid, order) / np.where(taut, slid, 1.0), 1.0)
-        read_input, read_output = self.apply_to_cells(input_force, worn, stroke, largest)
+        worn = self.apply_to_friction(input_force, slid, loads, order)
+        likely_worn = likely * np.where(taut, worn / np.where(taut, slid, 1.0), 1.0)
+        read_input, read_output = self.apply_to_cells(input_force, likely_worn, stroke, loads)
         return read_input, np.where(taut, output_force * read_output / np.where(taut, likely, 1.0), read_output)
 
     def apply_to_angles(self, angle: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
@@ -136,7 +164,8 @@ class ErrorSource:
     """One cause of error.
 
     Args:
-        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear", "load exponent", "zeros" or "crosstalk".
+        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear", "load exponent",
+            "compression", "zeros" or "crosstalk".
         words: The same with how well it is known.
         steps: Small errors of the readings that stand for it, each with its standard uncertainty in such steps.
         cells: How many independent errors within the same limits add up to it: 2 for two load cells.
@@ -182,6 +211,9 @@ def iterate_error_sources(description: Description) -> Iterator[ErrorSource]:
     if limits.load_exponent:
         words = f"a load exponent within {limits.load_exponent:g}"
         yield ErrorSource("load exponent", words, {BenchError(load_exponent=STEP): limits.load_exponent / sqrt(3) / STEP})
+    if limits.compression:
+        words = f"wrap angles that grow by up to {100 * limits.compression:g} % with the load"
+        yield ErrorSource("compression", words, {BenchError(compression=STEP): limits.compression / sqrt(3) / STEP})
     if not _READ_CELLS.intersection(description.tables.stated):
         return
     if limits.zero and not description.fits_offsets:

@@ -45,6 +45,7 @@ _SHOWN_ERRORS = {  # words, unit and factor in which an error is shown, by field
     "angle_offset": ("the offset of all wrap angles", "deg", float(np.rad2deg(1.0))),
     "wear": ("the change of friction from the first mounting to the last", "%", 100.0),
     "load_exponent": ("the load exponent", "", 1.0),
+    "compression": ("the growth of all wrap angles up to the largest load", "%", 100.0),
     "input_zero": ("the zero of the input's load cell, of its largest force,", "%", 100.0),
     "output_zero": ("the zero of the output's load cell, of its largest force,", "%", 100.0),
     "crosstalk": ("the share of the input force in the output's reading", "%", 100.0),

@@ -9,8 +9,9 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
+from bowdenfit.description.defaults import BenchErrors
 from bowdenfit.inference.bench_errors import LearnedErrors
-from bowdenfit.kinds.bench_error import BenchError, ErrorSource, iterate_error_sources, order_of
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, ErrorSource, iterate_error_sources, order_of
 from bowdenfit.kinds.recordings.kind import RecordingKind
 from bowdenfit.models import build_model
 from bowdenfit.questions.error_budget import with_bench_errors
@@ -52,9 +53,9 @@ def test_a_learned_error_has_the_posterior_of_normal_readings():
     assert np.var(draws) == pytest.approx(0.2, rel=0.01)
 
 
-def bench(path, gain=0.0, exponent=0.0, seed=1, crosstalk=0.0, zeros=(0.0, 0.0)):
-    """Write a sweep of eight mountings whose output cell reads too much, or part of the input, or whose friction depends on the
-    mean tension; zeros of both cells are in newtons.
+def bench(path, gain=0.0, exponent=0.0, seed=1, crosstalk=0.0, zeros=(0.0, 0.0), compression=0.0):
+    """Write a sweep of eight mountings whose output cell reads too much, or part of the input, or whose friction or wrap angles
+    depend on the mean tension; zeros of both cells are in newtons.
     """
     rng, rows = np.random.default_rng(seed), ["run,stroke,input_force_N,output_force_N,wrap_angle_deg"]
     middle = np.exp(np.mean(np.log(LOADS)))
@@ -64,7 +65,9 @@ def bench(path, gain=0.0, exponent=0.0, seed=1, crosstalk=0.0, zeros=(0.0, 0.0))
             for load in LOADS:
                 loss = 0.0
                 for _ in range(20):
-                    loss = MU * (load * np.exp(-stroke * loss / 2) / middle) ** exponent * np.radians(bend) + mounting
+                    tension = load * np.exp(-stroke * loss / 2)
+                    grown = np.radians(bend) * (1 + compression * tension / LOADS[-1])
+                    loss = MU * (tension / middle) ** exponent * grown + mounting
                 output = (load * np.exp(-stroke * loss) + crosstalk * load) * (1 + gain) * (1 + rng.normal(0, 0.004)) + zeros[1]
                 rows.append(f"m{number},{'pull' if stroke > 0 else 'return'},{load + zeros[0]},{output:.5f},{bend:.1f}")
     path.write_text("\n".join(rows) + "\n")
@@ -100,6 +103,18 @@ def test_a_load_exponent_within_its_stated_limit_is_learned_inside_runs(tmp_path
     assert "The readings reveal that the load exponent is -0." in " ".join(str(fit).split())
     assert exponent.mean == pytest.approx(-0.1, abs=3 * exponent.sd) and exponent.is_learned
     assert not bf.fit(path, seed=1, settings=["errors.load_exponent=0.01"]).verdict().trusted
+
+
+def test_wrap_angles_that_grow_with_the_load_are_learned_and_corrected_for(tmp_path):
+    """By 20 %, so that what the largest load adds, 13 % on average, is far more than the rest of the interval."""
+    path = bench(tmp_path / "bench.csv", compression=0.2)
+    settings = ["errors.compression=0.25", "errors.angle_scale=0", "errors.angle={value=0,unit='deg'}"]
+    fit = bf.fit(path, seed=1, settings=settings)
+    growth, interval = learned(fit, "growth"), fit.error_budget.row("mu")
+    assert fit.verdict().trusted, fit.verdict().reasons
+    assert growth.is_learned and growth.mean == pytest.approx(20, abs=3 * growth.sd)
+    assert interval.bench.q05 < MU < interval.bench.q95
+    assert interval.readings.q05 > MU  # wrap angles are those without a load
 
 
 def test_crosstalk_within_its_stated_limit_is_learned_and_corrected_for(tmp_path):
@@ -145,27 +160,38 @@ def test_without_errors_the_answers_are_those_of_the_readings(tmp_path):
     assert fit.error_budget.row("mu").readings == alone.parameter("mu") == fit.parameter_of_draws("mu")
 
 
+def test_errors_none_leaves_out_every_error(tmp_path):
+    limits = bf.read(bench(tmp_path / "bench.csv"), errors="none", settings=["errors.crosstalk=0.1"]).description.errors
+    assert limits.model_fields_set == set(BenchErrors.model_fields)
+    assert list(iterate_error_sources(bf.read(tmp_path / "bench.csv", errors="none").description)) == []
+
+
 def test_the_order_of_mountings_is_centered():
     assert order_of(np.array([0, 0, 1, 2]), 3).tolist() == [-0.5, -0.5, 0.0, 0.5]
     assert order_of(np.array([0, 0]), 1).tolist() == [0, 0]
 
 
 def test_wear_and_load_scale_the_loss():
-    forces = np.array([100.0, 100.0, 0.0])
-    worn = BenchError(wear=0.2).apply_to_friction(forces, np.array([50.0, 50.0, 0.0]), np.array([-0.5, 0.5, 0.5]))
+    forces = np.array([100.0, 100.0, 0.0]), np.array([50.0, 50.0, 0.0])
+    worn = BenchError(wear=0.2).apply_to_friction(*forces, BenchLoads.of(*forces), np.array([-0.5, 0.5, 0.5]))
     assert np.log(100 / worn[:2]) == pytest.approx(np.log(2) * np.array([0.9, 1.1]))
     assert worn[2] == 0
-    loaded = BenchError(load_exponent=0.1).apply_to_friction(np.array([50.0, 100.0, 200.0]), np.array([25.0, 50.0, 100.0]))
-    assert np.log(np.array([50.0, 100.0, 200.0]) / loaded) == pytest.approx(np.log(2) * 2.0 ** np.array([-0.1, 0, 0.1]))
+    forces = np.array([50.0, 100.0, 200.0]), np.array([25.0, 50.0, 100.0])
+    for error, factors in (
+        (BenchError(load_exponent=0.1), 2.0 ** np.array([-0.1, 0, 0.1])),
+        (BenchError(compression=0.1), 1 + 0.1 * np.array([0.25, 0.5, 1.0])),
+    ):
+        loaded = error.apply_to_friction(*forces, BenchLoads.of(*forces))
+        assert np.log(forces[0] / loaded) == pytest.approx(np.log(2) * factors)
 
 
-@pytest.mark.parametrize("kind", ["wear", "load_exponent", "crosstalk", "gain", "hysteresis"])
+@pytest.mark.parametrize("kind", ["wear", "load_exponent", "compression", "crosstalk", "gain", "hysteresis"])
 def test_an_error_moves_readings_of_a_rope_and_not_their_noise(kind):
     error, forces = BenchError(**{kind: 0.1}), (np.array([100.0, 100.0, 100.0]), np.array([50.0, 55.0, 45.0]))
-    slides, largest = np.ones(3, dtype=int), (200.0, 100.0)
-    read = error.apply_to_rope(forces, np.full(3, np.log(2)), slides, 0.25, largest)
+    slides, loads = np.ones(3, dtype=int), BenchLoads(200.0, 100.0, 60.0, 141.0)
+    read = error.apply_to_rope(forces, np.full(3, np.log(2)), slides, 0.25, loads)
     assert np.ptp(np.log(read[1] / forces[1])) == pytest.approx(0, abs=1e-12)
-    exact = error.apply_to_rope((forces[0], np.full(3, 50.0)), np.full(3, np.log(2)), slides, 0.25, largest)
+    exact = error.apply_to_rope((forces[0], np.full(3, 50.0)), np.full(3, np.log(2)), slides, 0.25, loads)
     assert read[1][0] == exact[1][0]
 
 

@@ -15,7 +15,7 @@ from bowdenfit.files.columns import (
     remark_on_errors_in_cells,
     require_column,
 )
-from bowdenfit.kinds.bench_error import BenchError, order_of
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
 from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import (
@@ -169,8 +169,9 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
     @override
     def with_bench_error(self, table: EfficiencyTable, error: BenchError) -> EfficiencyTable:
         """Return the table with the error in its efficiencies and wrap angles."""
-        count = len(table.efficiency)
-        efficiency = error.apply_to_force(error.apply_to_friction(1.0, table.efficiency, order_of(np.arange(count), count)))
+        count, inputs = len(table.efficiency), np.ones(len(table.efficiency))
+        loads, order = BenchLoads.of(inputs, table.efficiency), order_of(np.arange(count), count)
+        efficiency = error.apply_to_force(error.apply_to_friction(inputs, table.efficiency, loads, order))
         return replace(table, efficiency=efficiency, own=error.apply_to_rows(table.own))
 
     @override

@@ -10,7 +10,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.bench_error import BenchError, order_of
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.misread_angles import describe_misread_angles
 from bowdenfit.kinds.forces.mountings import ForceSettings
@@ -215,8 +215,8 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:
         """Return the table with the error in its forces and wrap angles."""
         forces, order = (table.input_force, table.output_force), order_of(table.run, len(table.run_names))
-        largest = float(table.input_force.max()), float(table.output_force.max())
-        input_force, output_force = error.apply_to_rope(forces, _smooth_log_ratio(table), table.stroke, order, largest)
+        log_ratio = _smooth_log_ratio(table)
+        input_force, output_force = error.apply_to_rope(forces, log_ratio, table.stroke, order, BenchLoads.of(*forces))
         return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override

@@ -14,7 +14,7 @@ from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity
 from bowdenfit.files.headings import meanings
 from bowdenfit.files.tables import RawTable
-from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.measured_columns import MeasuredColumn, pair_forces
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, compare_without_runs, describe_copies
@@ -211,8 +211,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
     def with_bench_error(self, table: LoopTable, error: BenchError) -> LoopTable:
         """Return the table with the error in its forces and wrap angles."""
         forces = table.input_force, table.output_force
-        largest = float(np.abs(forces[0]).max()), float(np.abs(forces[1]).max())
-        input_force, output_force = error.apply_to_cells(*forces, table.stroke, largest)
+        input_force, output_force = error.apply_to_cells(*forces, table.stroke, BenchLoads.of(*forces))
         return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override

@@ -10,7 +10,7 @@ from bowdenfit.description import Description, Preparation, QuantityValue
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.headings import Quantity
-from bowdenfit.kinds.bench_error import BenchError, order_of
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of
 from bowdenfit.kinds.kind import FrictionKind, Readings, efficiency_readings
 from bowdenfit.kinds.motor_readings import check_gear
 from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, explain_impossible_loss
@@ -319,17 +319,17 @@ class RecordingKind(FrictionKind[Recordings]):
     @override
     def with_bench_error(self, table: Recordings, error: BenchError) -> Recordings:
         """Return the recordings with the error in their forces and wrap angles; their strokes stay."""
-        of_input, of_output = ([getattr(r.blocks, end).max() for r in table.items] for end in ("input_force", "output_force"))
-        largest = float(max(of_input)), float(max(of_output))
+        ends = ("input_force", "output_force")
+        loads = BenchLoads.of(*(np.concatenate([getattr(r.blocks, end) for r in table.items]) for end in ends))
         items, order = [], order_of(np.array([table.runs.index(recording.run) for recording in table.items]), len(table.runs))
         for recording, late in zip(table.items, order, strict=True):
             blocks, strokes = recording.blocks, recording.strokes
             forces = blocks.input_force, blocks.output_force
             if table.loop:
-                input_force, output_force = error.apply_to_cells(*forces, strokes.contact, largest)
+                input_force, output_force = error.apply_to_cells(*forces, strokes.contact, loads)
             else:
                 log_ratio = strokes.center + last_contact(strokes.contact) * strokes.exponent
-                input_force, output_force = error.apply_to_rope(forces, log_ratio, strokes.contact, late, largest)
+                input_force, output_force = error.apply_to_rope(forces, log_ratio, strokes.contact, late, loads)
             angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
             read = replace(blocks, input_force=input_force, output_force=output_force, finer=None)
             items.append(replace(recording, own_angle=angle, blocks=read))

@@ -46,16 +46,16 @@ class BenchReplicator(Replicator):
     """Replicates a bench whose errors are drawn from their limits.
 
     Args:
-        errors: Drawn errors in units of their standard uncertainties, by replication.
+        errors: Drawn errors in units of their standard uncertainties, by kind, by replication.
     """
 
-    errors: dict[int, np.ndarray] = field(default_factory=dict)
+    errors: dict[int, dict[str, float]] = field(default_factory=dict)
 
     def _simulate(self, number: int) -> SimulatedTables:
         generator = np.random.default_rng([self.plan.seed, number])
         z, dataset, redrawn = self._draw_tables(generator)
         sources = tuple(iterate_error_sources(dataset.description))
-        self.errors[number] = np.array([error for source in sources for error in draw_errors(source, generator)])
+        self.errors[number] = {kind: error for source in sources for kind, error in draw_errors(source, generator)}
         read = Dataset(dataset.description, add_errors(dataset.measurements, sources, self.errors[number]), {})
         model = replace(replace_data(self.assumed, read), measurements=read.measurements)
         return SimulatedTables(
@@ -69,27 +69,27 @@ class BenchReplicator(Replicator):
         moved = super()._rank_truths(simulated, replace(fit, z=fit.z + draws @ learned.moves.T))
         steps = [step.kind for source in learned.sources for step in source.steps]
         return moved | {
-            f"error: {kind}": rank_truth(-error, column)  # readings have the error, and are corrected by the opposite
-            for kind, error, column in zip(steps, errors, draws.T, strict=True)
+            f"error: {kind}": rank_truth(-errors[kind], column)  # readings have it, and are corrected by the opposite
+            for kind, column in zip(steps, draws.T, strict=True)
         }
 
 
-def draw_errors(source: ErrorSource, generator: np.random.Generator) -> Iterator[float]:
+def draw_errors(source: ErrorSource, generator: np.random.Generator) -> Iterator[tuple[str, float]]:
     """Yield each error of a source, in units of its standard uncertainty: every value within the limit is as likely."""
-    for _ in source.steps:
-        yield generator.uniform(-1, 1, source.cells).sum() * np.sqrt(3 / source.cells)
+    for step in source.steps:
+        yield step.kind, generator.uniform(-1, 1, source.cells).sum() * np.sqrt(3 / source.cells)
 
 
-def add_errors(measurements: Measurements, sources: tuple[ErrorSource, ...], errors: np.ndarray) -> Measurements:
+def add_errors(measurements: Measurements, sources: tuple[ErrorSource, ...], errors: dict[str, float]) -> Measurements:
     """Return tables as a bench with these errors reads them.
 
     Args:
         measurements: Tables without errors.
         sources: Causes of error.
-        errors: Error of each step of each source, in units of its standard uncertainty.
+        errors: Each error in units of its standard uncertainty, by kind.
     """
     steps = [(step.kind, size * getattr(step, step.kind)) for source in sources for step, size in source.steps.items()]
-    error = BenchError(**{kind: size * units for (kind, size), units in zip(steps, errors, strict=True)})
+    error = BenchError(**{kind: size * errors[kind] for kind, size in steps})
     return Measurements(tuple(kind.with_bench_error(table, error) for kind, table in iterate_tables(measurements)))
 
 

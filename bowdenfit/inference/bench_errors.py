@@ -33,6 +33,7 @@ from bowdenfit.inference.solver import ROUGH
 from bowdenfit.kinds.bench_error import ErrorSource, iterate_error_sources
 
 _FREE = 1e-6  # weight of a prior that does not count
+_ROUNDING = 1e-6  # of a standard deviation, below which an error does not move a reading
 # Standard deviations of the estimate of an error within its limit, beyond which it contradicts that limit: so it is of one of
 # six errors in one healthy fit in a hundred.
 CONTRADICTION = 3.1
@@ -43,7 +44,7 @@ class LearnedErrors:
     """Posterior of the errors of a bench, in units of their standard uncertainties, in linear approximation.
 
     Args:
-        sources: Causes of error; each has one column or more below.
+        sources: Causes of error that move a reading; each has one column or more below.
         source: Number of the source of each column.
         mean: Posterior mean of each, (errors).
         covariance: Posterior covariance, (errors, errors).
@@ -51,6 +52,7 @@ class LearnedErrors:
         moves: Change of each z with each error, (free, errors).
         columns: Change of each residual with each error, (residuals, errors).
         inside: Change of each reading inside runs from its cell, in units of its noise, (readings, errors), by table.
+        without_effect: Causes of error that move no reading, as wear where the cable was mounted once.
     """
 
     sources: tuple[ErrorSource, ...]
@@ -61,6 +63,7 @@ class LearnedErrors:
     moves: np.ndarray
     columns: np.ndarray
     inside: Mapping[str, np.ndarray]
+    without_effect: tuple[ErrorSource, ...] = ()
 
     def mean_of(self, kinds: Collection[str]) -> Float[np.ndarray, " errors"]:
         """Return the posterior mean if there are only errors of some kinds, and of these those that keep their limits.
@@ -156,8 +159,8 @@ def _learn(
     values: Mapping[str, Any],
     prior: np.ndarray,
     z: np.ndarray,
-) -> LearnedErrors:
-    """Return the posterior of the errors.
+) -> LearnedErrors | None:
+    """Return the posterior of the errors; None where none moves a reading.
 
     Args:
         posterior: The posterior.
@@ -170,14 +173,22 @@ def _learn(
     jacobian, residuals = (np.nan_to_num(np.asarray(part)) for part in evaluate(posterior.data))
     jacobian = jacobian * (prior > 0)
     inside = {term.name: _inside_runs(term, values) for term in posterior.model.terms}
-    columns, of_readings, numbers = list[np.ndarray](), list[dict[str, np.ndarray]](), list[int]()
-    for number, source in enumerate(sources):
+    columns, of_readings, effective = list[np.ndarray](), list[dict[str, np.ndarray]](), list[ErrorSource]()
+    for source in sources:
         for step, size in source.steps.items():
             terms = posterior.model.terms_with_error(step)
             changed = np.asarray(evaluate(tuple(term.data for term in terms))[1])
             columns.append(np.nan_to_num((changed - residuals) * size, posinf=0.0, neginf=0.0))
             of_readings.append({term.name: (_inside_runs(term, values) - inside[term.name]) * size for term in terms})
-            numbers.append(number)
+        steps = len(source.steps)
+        moved = [part for k in range(-steps, 0) for part in (columns[k], *of_readings[k].values())]
+        if max(np.abs(part).max(initial=0.0) for part in moved) > _ROUNDING:
+            effective.append(source)
+        else:
+            del columns[-steps:], of_readings[-steps:]
+    if not effective:
+        return None
+    numbers = [number for number, source in enumerate(effective) for _ in source.steps]
     errors = np.stack(columns, axis=1)
     readings = {name: np.stack([of_error[name] for of_error in of_readings], axis=1) for name in inside}
     with_priors = np.concatenate([jacobian, np.diag(np.where(prior > 0, prior, 1.0))])
@@ -189,7 +200,8 @@ def _learn(
     information = (information + information.T) / 2
     of_direction, directions = np.linalg.eigh(information)  # below 0 by rounding alone, where readings say nothing
     covariance = (directions / (1 + np.maximum(of_direction, 0.0))) @ directions.T
-    return LearnedErrors(sources, np.array(numbers), -covariance @ gradient, covariance, information, moves, errors, readings)
+    mean, others = -covariance @ gradient, tuple(source for source in sources if source not in effective)
+    return LearnedErrors(tuple(effective), np.array(numbers), mean, covariance, information, moves, errors, readings, others)
 
 
 def _inside_runs(term: Any, values: Mapping[str, Any]) -> np.ndarray:

@@ -138,14 +138,16 @@ class ErrorBudget(Display):
     """Every answer of a fit, by the readings alone and with the usual or stated errors of a bench.
 
     Args:
-        sources: Causes of error.
+        sources: Causes of error that move a reading.
         rows: The answers.
         learned: What the readings reveal of each error.
+        without_effect: Causes of error that move no reading.
     """
 
     sources: tuple[ErrorSource, ...]
     rows: tuple[BudgetRow, ...]
     learned: tuple[LearnedError, ...] = ()
+    without_effect: tuple[ErrorSource, ...] = ()
 
     def row(self, quantity: str) -> BudgetRow | None:
         """Return the row of a quantity; None where there is none."""
@@ -162,6 +164,9 @@ class ErrorBudget(Display):
         sentences = [f"Bench errors that readings do not reveal ({limits}) add {added}. {_INCLUDED}"]
         if revealed := [str(error) for error in self.learned if error.is_learned]:
             sentences.append(f"The readings reveal that {listed(revealed)}; the answers are corrected for it.")
+        if self.without_effect:
+            names = listed([source.name for source in self.without_effect])
+            sentences.append(f"Errors that move no reading here: {names}.")
         return sentences
 
     def _table(self) -> Rows:
@@ -236,7 +241,7 @@ def error_budget(fit: Record) -> ErrorBudget | None:
         scale, degrees = fit_t_distribution(draws)
         effective = effective_degrees_of_freedom([scale, *shifts.values()], [degrees, *[np.inf] * len(shifts)])
         rows.append(BudgetRow(name, unit, Interval.of(draws), Interval.of(moved), shifts, effective))
-    return ErrorBudget(learned.sources, tuple(rows), _list_learned(learned))
+    return ErrorBudget(learned.sources, tuple(rows), _list_learned(learned), learned.without_effect)
 
 
 def _list_learned(learned: LearnedErrors) -> tuple[LearnedError, ...]:

@@ -166,6 +166,16 @@ def test_errors_none_leaves_out_every_error(tmp_path):
     assert list(iterate_error_sources(bf.read(tmp_path / "bench.csv", errors="none").description)) == []
 
 
+def test_an_error_that_moves_no_reading_is_not_said_to_be_included(tmp_path):
+    """Friction of a cable that was mounted once cannot have changed from mounting to mounting."""
+    path = bench(tmp_path / "bench.csv")
+    path.write_text("".join(line for line in path.read_text().splitlines(True) if line.startswith(("run", "m0"))))
+    budget = bf.fit(path, seed=1).error_budget
+    assert [source.name for source in budget.without_effect] == ["wear"]
+    assert "wear" not in {source.name for source in budget.sources} and "wear" not in budget.rows[0].shifts
+    assert "wear" not in budget.sentences()[0] and budget.sentences()[-1] == "Errors that move no reading here: wear."
+
+
 def test_the_order_of_mountings_is_centered():
     assert order_of(np.array([0, 0, 1, 2]), 3).tolist() == [-0.5, -0.5, 0.0, 0.5]
     assert order_of(np.array([0, 0]), 1).tolist() == [0, 0]

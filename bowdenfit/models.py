@@ -28,7 +28,7 @@ from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.covariates import Covariates, collect_covariates
 from bowdenfit.kinds.runs import RunsData, RunsTerm
 from bowdenfit.kinds.tables import AngleTable, Measurements
-from bowdenfit.kinds.term import Term, find_row_angles
+from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import TERMS, collect_parameters, iterate_term_kinds, make_measured_cable
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -106,7 +106,8 @@ def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) ->
     """Return data of a term whose rows also hold the constant wrap angles of cable.toml, those without a stated error."""
     if isinstance(data, RunsData):
         return replace(data, cells=_with_constant_angles(data.cells, cable, error))
-    angles = find_row_angles(data)
+    name = "run_angles" if hasattr(data, "run_angles") else "angles"
+    angles = getattr(data, name, None)
     if angles is None:
         return data
     own_angles, is_own = np.array(angles.own, dtype=float), np.array(angles.is_own)
@@ -115,7 +116,7 @@ def _with_constant_angles(data: Any, cable: CableContacts, error: BenchError) ->
         if constant is not None and constant.sd is None:
             own_angles[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
             is_own[..., k] = True
-    return replace(data, angles=replace(angles, own=own_angles, is_own=is_own))
+    return replace(data, **{name: replace(angles, own=own_angles, is_own=is_own)})
 
 
 def _build_space(cable: CableContacts, measurements: Measurements) -> ParameterSpace:

@@ -10,9 +10,10 @@ from jaxtyping import Float
 
 from bowdenfit.description import Description
 from bowdenfit.kinds.rows import OwnAngles
-from bowdenfit.types import Labels, Vector
+from bowdenfit.types import Labels, Matrix, Vector
 
 _READ_CELLS = frozenset({"forces", "recordings", "loop"})  # tables that hold the readings of both load cells
+_PARABOLA = 3  # coefficients
 STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 
 
@@ -87,12 +88,28 @@ class BenchError:
         """Return input and output forces [N] as the bench would read them.
 
         Args:
-            input_force, output_force: As they were read.
+            input_force, output_force: As they were read, without their noise.
             stroke: +1 pulling, -1 returning, 0 neither.
             loads: Loads of the whole table.
         """
         output = self.apply_to_force(output_force + self.crosstalk * input_force, stroke)
         return input_force + self.input_zero * loads.input_force, output + self.output_zero * loads.output_force
+
+    def apply_to_loop(
+        self, forces: tuple[Vector, Vector], stroke: Labels, group: Labels, loads: BenchLoads
+    ) -> tuple[Vector, Vector]:
+        """Return input and output forces [N] of a loop as the bench would read them; their noise is not of the bench.
+
+        Args:
+            forces: Input and output force as they were read [N].
+            stroke: +1 moving forward, -1 back, 0 neither.
+            group: Number of the setting and stroke of each.
+            loads: Loads of the whole table.
+        """
+        input_force, output_force = forces
+        smooth = smooth_readings(output_force, powers(input_force, _PARABOLA), group)
+        read_input, changed = self.apply_to_cells(input_force, smooth, stroke, loads)
+        return read_input, output_force + changed - smooth
 
     def apply_to_friction(
         self, input_force: Vector, output_force: Vector, loads: BenchLoads, order: Vector | float = 0.0
@@ -147,6 +164,29 @@ class BenchError:
     def apply_to_rows(self, own: OwnAngles) -> OwnAngles:
         """Return wrap angles measured with rows; one with a standard deviation stays, because its error is in the fit."""
         return replace(own, angle=np.where(np.isnan(own.sd), self.apply_to_angles(own.angle), own.angle))
+
+
+def smooth_readings(reading: Vector, columns: Matrix, group: Labels, weight: Vector | float = 1.0) -> Vector:
+    """Return readings without most of their noise, which an error of the bench does not scale: by least squares in each group.
+
+    Args:
+        reading: Readings.
+        columns: What they depend on linearly, (readings, columns).
+        group: Number of the group of each, such as its stroke.
+        weight: Weight of each residual.
+    """
+    smooth, weights = np.empty(len(reading)), np.broadcast_to(weight, len(reading))
+    for number in np.unique(group):
+        rows = group == number
+        weighed = columns[rows] * weights[rows, None]
+        smooth[rows] = columns[rows] @ np.linalg.lstsq(weighed, reading[rows] * weights[rows], rcond=None)[0]
+    return smooth
+
+
+def powers(values: Vector, count: int) -> Matrix:
+    """Return the columns of a polynomial with so many coefficients; a value that is not known counts as 0."""
+    finite = np.nan_to_num(values)
+    return np.vander(finite / max(float(np.max(np.abs(finite), initial=0.0)), 1e-300), count)
 
 
 def order_of(number: Labels, count: int) -> Vector:

@@ -193,6 +193,7 @@ def _is_far(column: MeasuredColumn) -> Flags:
     far |= (values == largest) & (largest > _ALONE * below)
     if column.other_end is not None:
         ratio = values / np.where(column.other_end > 0, column.other_end, np.nan)
-        lost = np.nanmedian(np.maximum(ratio, 1 / ratio))
-        far |= (ratio > _ONE_SIDED * lost) & (values > _ONE_SIDED * np.nanmedian(values))
+        lost = np.maximum(ratio, 1 / ratio)
+        if np.isfinite(lost).any():  # forces of a loop may be negative at one end wherever they are positive at the other
+            far |= (ratio > _ONE_SIDED * np.nanmedian(lost)) & (values > _ONE_SIDED * np.nanmedian(values))
     return far

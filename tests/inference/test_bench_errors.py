@@ -2,16 +2,25 @@
 
 import math
 
+import catheters
 import numpy as np
 import pytest
 from recorded_benches import RecordedBench, write
 from scipy import stats
+from spoiled_input import copied
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description.defaults import BenchErrors
 from bowdenfit.inference.bench_errors import LearnedErrors
-from bowdenfit.kinds.bench_error import BenchError, BenchLoads, ErrorSource, iterate_error_sources, order_of
+from bowdenfit.kinds.bench_error import (
+    BenchError,
+    BenchLoads,
+    ErrorSource,
+    iterate_error_sources,
+    order_of,
+    smooth_readings,
+)
 from bowdenfit.kinds.recordings.kind import RecordingKind
 from bowdenfit.models import build_model
 from bowdenfit.questions.error_budget import with_bench_errors
@@ -173,7 +182,38 @@ def test_an_error_that_moves_no_reading_is_not_said_to_be_included(tmp_path):
     budget = bf.fit(path, seed=1).error_budget
     assert [source.name for source in budget.without_effect] == ["wear"]
     assert "wear" not in {source.name for source in budget.sources} and "wear" not in budget.rows[0].shifts
-    assert "wear" not in budget.sentences()[0] and budget.sentences()[-1] == "Errors that move no reading here: wear."
+    assert "wear" not in budget.sentences()[0] and budget.sentences()[-1].endswith(": wear.")
+
+
+def test_angles_of_force_against_displacement_have_an_error(on_body, tmp_path):
+    """All 2 % too large, which no reading shows. Noise of 133 readings would stand for a gain of one standard deviation."""
+    folder = copied(on_body.parent / "synthetic-catheter", ("cable.toml", "displacement.csv"), tmp_path / "cable")
+    heading, *rows = (folder / "displacement.csv").read_text().splitlines()
+    scaled = [f"{1.02 * float(angle):.2f},{read}" for angle, read in (row.split(",", 1) for row in rows)]
+    (folder / "displacement.csv").write_text("\n".join([heading, *scaled]) + "\n")
+    fit, truth = bf.fit(folder, seed=1), catheters.TRUTH["mu"]
+    interval, gain = fit.error_budget.row("mu"), learned(fit, "gain")
+    assert fit.verdict().trusted
+    assert interval.bench.q05 < truth < interval.bench.q95
+    assert interval.readings.q95 < truth
+    assert abs(gain.mean) < 0.2 * gain.limit_sd
+    assert [source.name for source in fit.error_budget.without_effect] == ["wear", "load exponent", "compression"]
+
+
+@pytest.mark.parametrize("table", ["efficiencies", "loop"])
+def test_smoothing_leaves_noise_where_it_was(table):
+    """An error of 10 % scales what is expected of readings, and adds nothing to their scatter."""
+    rng, x, groups = np.random.default_rng(4), np.linspace(1, 9, 60), np.arange(60) % 2
+    exact = 3 * x + groups
+    noisy = exact + rng.normal(0, 0.3, 60)
+    if table == "loop":
+        loads = BenchLoads(9.0, 30.0, 10.0, 20.0)
+        read, changed = BenchError(gain=0.1).apply_to_loop((x, noisy), np.ones(60, dtype=int), groups, loads)
+        assert np.array_equal(read, x)
+    else:
+        smooth = smooth_readings(noisy, np.vander(x, 3), groups)
+        changed = noisy + BenchError(gain=0.1).apply_to_force(smooth) - smooth
+    assert changed - noisy == pytest.approx(0.1 * exact, abs=0.035)  # of noise of 0.03, 0.07 and more would be left
 
 
 def test_the_order_of_mountings_is_centered():

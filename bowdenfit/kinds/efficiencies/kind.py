@@ -15,7 +15,7 @@ from bowdenfit.files.columns import (
     remark_on_errors_in_cells,
     require_column,
 )
-from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of, powers, smooth_readings
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
 from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import (
@@ -171,8 +171,10 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         """Return the table with the error in its efficiencies and wrap angles."""
         count, inputs = len(table.efficiency), np.ones(len(table.efficiency))
         loads, order = BenchLoads.of(inputs, table.efficiency), order_of(np.arange(count), count)
-        efficiency = error.apply_to_force(error.apply_to_friction(inputs, table.efficiency, loads, order))
-        return replace(table, efficiency=efficiency, own=error.apply_to_rows(table.own))
+        columns = np.column_stack([powers(table.route, 4), np.nan_to_num(table.own.angle)])
+        smooth = smooth_readings(table.efficiency, columns, np.zeros(count, dtype=int))
+        changed = error.apply_to_force(error.apply_to_friction(inputs, smooth, loads, order))
+        return replace(table, efficiency=table.efficiency + changed - smooth, own=error.apply_to_rows(table.own))
 
     @override
     def why_implausible(self, measured: EfficiencyTable, simulated: EfficiencyTable) -> str:

@@ -10,7 +10,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, order_of, powers, smooth_readings
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.misread_angles import describe_misread_angles
 from bowdenfit.kinds.forces.mountings import ForceSettings
@@ -338,12 +338,8 @@ def _smooth_log_ratio(table: ForceTable) -> Vector:
     ratio = np.zeros(len(slides))
     ratio[slides] = np.log(table.input_force[slides] / table.output_force[slides])
     load = np.log(np.where(slides, table.input_force, 1.0))
-    route = np.nan_to_num(table.route) / max(float(np.max(np.abs(np.nan_to_num(table.route)), initial=0.0)), 1e-300)
-    columns = np.column_stack([np.vander(route, 4), np.nan_to_num(table.own.angle), load])
+    columns = np.column_stack([powers(table.route, 4), np.nan_to_num(table.own.angle), load])
     group = number_names(table.group)[0] if table.group else np.zeros(len(slides), dtype=int)
-    for key in np.unique(np.column_stack([group, table.stroke])[slides], axis=0):
-        rows = slides & (group == key[0]) & (table.stroke == key[1])
-        weight = table.input_force[rows]  # noise of a log ratio is that of the cells over their force
-        coefficients = np.linalg.lstsq(columns[rows] * weight[:, None], ratio[rows] * weight, rcond=None)[0]
-        ratio[rows] = columns[rows] @ coefficients
+    weight = table.input_force[slides]  # noise of a log ratio is that of the cells over their force
+    ratio[slides] = smooth_readings(ratio[slides], columns[slides], (3 * group + table.stroke)[slides], weight)
     return ratio

@@ -211,7 +211,8 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
     def with_bench_error(self, table: LoopTable, error: BenchError) -> LoopTable:
         """Return the table with the error in its forces and wrap angles."""
         forces = table.input_force, table.output_force
-        input_force, output_force = error.apply_to_cells(*forces, table.stroke, BenchLoads.of(*forces))
+        strokes = 3 * _number_settings(table)[1] + table.stroke
+        input_force, output_force = error.apply_to_loop(forces, table.stroke, strokes, BenchLoads.of(*forces))
         return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override

@@ -326,7 +326,7 @@ class RecordingKind(FrictionKind[Recordings]):
             blocks, strokes = recording.blocks, recording.strokes
             forces = blocks.input_force, blocks.output_force
             if table.loop:
-                input_force, output_force = error.apply_to_cells(*forces, strokes.contact, loads)
+                input_force, output_force = error.apply_to_loop(forces, strokes.contact, strokes.contact, loads)
             else:
                 log_ratio = strokes.center + last_contact(strokes.contact) * strokes.exponent
                 input_force, output_force = error.apply_to_rope(forces, log_ratio, strokes.contact, late, loads)

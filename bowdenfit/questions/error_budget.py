@@ -166,7 +166,7 @@ class ErrorBudget(Display):
             sentences.append(f"The readings reveal that {listed(revealed)}; the answers are corrected for it.")
         if self.without_effect:
             names = listed([source.name for source in self.without_effect])
-            sentences.append(f"Not included, because no reading follows from it here: {names}.")
+            sentences.append(f"Not included here: {names}.")
         return sentences
 
     def _table(self) -> Rows:

@@ -161,6 +161,14 @@ class BenchError:
         """Return wrap angles [rad] as the bench would read them; an angle of 0, and one that is not known, stays."""
         return np.where(angle > 0, angle * (1 + self.angle_scale) + self.angle_offset, angle)
 
+    def where_angles_grow(self, sds: Float[np.ndarray, "..."]) -> "BenchError":
+        """Return the error without growth of wrap angles where all measured ones have a stated error, which is in the fit.
+
+        Args:
+            sds: Standard deviations of the wrap angles measured with rows [rad]; NaN where none is stated.
+        """
+        return replace(self, compression=0.0) if sds.size and np.all(np.isfinite(sds)) else self
+
     def apply_to_rows(self, own: OwnAngles) -> OwnAngles:
         """Return wrap angles measured with rows; one with a standard deviation stays, because its error is in the fit."""
         return replace(own, angle=np.where(np.isnan(own.sd), self.apply_to_angles(own.angle), own.angle))

@@ -235,6 +235,11 @@ def test_wear_and_load_scale_the_loss():
         assert np.log(forces[0] / loaded) == pytest.approx(np.log(2) * factors)
 
 
+@pytest.mark.parametrize(("sds", "grow"), [([0.01, 0.02], False), ([0.01, np.nan], True), ([], True)])
+def test_angles_that_all_have_a_stated_error_do_not_grow(sds, grow):
+    assert BenchError(compression=0.1).where_angles_grow(np.array(sds)).compression == (0.1 if grow else 0.0)
+
+
 @pytest.mark.parametrize("kind", ["wear", "load_exponent", "compression", "crosstalk", "gain", "hysteresis"])
 def test_an_error_moves_readings_of_a_rope_and_not_their_noise(kind):
     error, forces = BenchError(**{kind: 0.1}), (np.array([100.0, 100.0, 100.0]), np.array([50.0, 55.0, 45.0]))

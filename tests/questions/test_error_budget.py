@@ -112,7 +112,7 @@ def test_the_best_length_includes_them_and_stays_within_its_range(quick_fit):
 def test_stated_errors_replace_the_usual_ones_or_leave_the_budget(tmp_path):
     path = bench(tmp_path / "table.csv", noise=5e-4)
     settings = ["errors.angle_scale=0", "errors.angle={value=0,unit='deg'}", "errors.hysteresis=0.001"]
-    settings += ["errors.wear=0", "errors.load_exponent=0", "errors.zero=0"]
+    settings += ["errors.wear=0", "errors.load_exponent=0", "errors.compression=0", "errors.zero=0"]
     settings += ["sensors.input_gain_error_sd=0.001", "sensors.output_gain_error_sd=0.001"]
     row = budget_of(bf.fit(path, seed=1, settings=settings)).row("mu")
     assert set(row.shifts) == {"hysteresis"}

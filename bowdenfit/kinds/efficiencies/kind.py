@@ -173,7 +173,8 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         loads, order = BenchLoads.of(inputs, table.efficiency), order_of(np.arange(count), count)
         columns = np.column_stack([powers(table.route, 4), np.nan_to_num(table.own.angle)])
         smooth = smooth_readings(table.efficiency, columns, np.zeros(count, dtype=int))
-        changed = error.apply_to_force(error.apply_to_friction(inputs, smooth, loads, order))
+        friction = error.where_angles_grow(table.own.sd)
+        changed = error.apply_to_force(friction.apply_to_friction(inputs, smooth, loads, order))
         return replace(table, efficiency=table.efficiency + changed - smooth, own=error.apply_to_rows(table.own))
 
     @override

@@ -215,8 +215,8 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:
         """Return the table with the error in its forces and wrap angles."""
         forces, order = (table.input_force, table.output_force), order_of(table.run, len(table.run_names))
-        log_ratio = _smooth_log_ratio(table)
-        input_force, output_force = error.apply_to_rope(forces, log_ratio, table.stroke, order, BenchLoads.of(*forces))
+        rope, log_ratio = error.where_angles_grow(table.own.sd), _smooth_log_ratio(table)
+        input_force, output_force = rope.apply_to_rope(forces, log_ratio, table.stroke, order, BenchLoads.of(*forces))
         return replace(table, input_force=input_force, output_force=output_force, own=error.apply_to_rows(table.own))
 
     @override

@@ -329,7 +329,8 @@ class RecordingKind(FrictionKind[Recordings]):
                 input_force, output_force = error.apply_to_loop(forces, strokes.contact, strokes.contact, loads)
             else:
                 log_ratio = strokes.center + last_contact(strokes.contact) * strokes.exponent
-                input_force, output_force = error.apply_to_rope(forces, log_ratio, strokes.contact, late, loads)
+                rope = error.where_angles_grow(recording.own_sd)
+                input_force, output_force = rope.apply_to_rope(forces, log_ratio, strokes.contact, late, loads)
             angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
             read = replace(blocks, input_force=input_force, output_force=output_force, finer=None)
             items.append(replace(recording, own_angle=angle, blocks=read))

@@ -19,8 +19,8 @@ from bowdenfit.kinds.bench_error import (
     ErrorSource,
     iterate_error_sources,
     order_of,
-    smooth_readings,
 )
+from bowdenfit.kinds.efficiencies.kind import EfficiencyKind, EfficiencyTable
 from bowdenfit.kinds.recordings.kind import RecordingKind
 from bowdenfit.models import build_model
 from bowdenfit.questions.error_budget import with_bench_errors
@@ -200,20 +200,23 @@ def test_angles_of_force_against_displacement_have_an_error(on_body, tmp_path):
     assert [source.name for source in fit.error_budget.without_effect] == ["wear", "load exponent", "compression"]
 
 
-@pytest.mark.parametrize("table", ["efficiencies", "loop"])
-def test_smoothing_leaves_noise_where_it_was(table):
-    """An error of 10 % scales what is expected of readings, and adds nothing to their scatter."""
-    rng, x, groups = np.random.default_rng(4), np.linspace(1, 9, 60), np.arange(60) % 2
-    exact = 3 * x + groups
-    noisy = exact + rng.normal(0, 0.3, 60)
-    if table == "loop":
-        loads = BenchLoads(9.0, 30.0, 10.0, 20.0)
-        read, changed = BenchError(gain=0.1).apply_to_loop((x, noisy), np.ones(60, dtype=int), groups, loads)
-        assert np.array_equal(read, x)
-    else:
-        smooth = smooth_readings(noisy, np.vander(x, 3), groups)
-        changed = noisy + BenchError(gain=0.1).apply_to_force(smooth) - smooth
-    assert changed - noisy == pytest.approx(0.1 * exact, abs=0.035)  # of noise of 0.03, 0.07 and more would be left
+def test_an_error_moves_readings_of_a_loop_and_not_their_noise():
+    rng, x, strokes = np.random.default_rng(4), np.linspace(1, 9, 60), np.arange(60) % 2
+    noisy = 3 * x + strokes + rng.normal(0, 0.3, 60)
+    read, changed = BenchError(gain=0.1).apply_to_loop((x, noisy), strokes, strokes, BenchLoads(9.0, 30.0, 10.0, 20.0))
+    assert np.array_equal(read, x)
+    assert changed - noisy == pytest.approx(0.1 * (3 * x + strokes), abs=0.035)  # of noise of 0.03, 0.07 and more would be left
+
+
+def test_an_error_moves_efficiencies_and_not_their_noise(tmp_path):
+    bend = np.tile([45.0, 90.0, 135.0, 180.0], 15)
+    exact = 0.9 - 0.1 * np.radians(bend)
+    noisy = exact + np.random.default_rng(4).normal(0, 0.03, 60)
+    rows = (f"{e:.6f},{b:g}" for e, b in zip(noisy, bend, strict=True))
+    (tmp_path / "bench.csv").write_text("\n".join(["efficiency,wrap_angle_deg", *rows]) + "\n")
+    table = bf.read(tmp_path / "bench.csv").measurements.table(EfficiencyTable)
+    changed = EfficiencyKind().with_bench_error(table, BenchError(gain=0.1)).efficiency
+    assert changed - table.efficiency == pytest.approx(0.1 * exact, abs=0.003)  # of noise of 0.003, 0.007 would be left
 
 
 def test_the_order_of_mountings_is_centered():

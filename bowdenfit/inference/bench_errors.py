@@ -200,8 +200,10 @@ def _learn(
     information = (information + information.T) / 2
     of_direction, directions = np.linalg.eigh(information)  # below 0 by rounding alone, where readings say nothing
     covariance = (directions / (1 + np.maximum(of_direction, 0.0))) @ directions.T
-    mean, others = -covariance @ gradient, tuple(source for source in sources if source not in effective)
-    return LearnedErrors(tuple(effective), np.array(numbers), mean, covariance, information, moves, errors, readings, others)
+    mean, ineffective = -covariance @ gradient, tuple(source for source in sources if source not in effective)
+    return LearnedErrors(
+        tuple(effective), np.array(numbers), mean, covariance, information, moves, errors, readings, ineffective
+    )
 
 
 def _inside_runs(term: Any, values: Mapping[str, Any]) -> np.ndarray:

@@ -13,7 +13,7 @@ from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Labels, Matrix, Vector
 
 _READ_CELLS = frozenset({"forces", "recordings", "loop"})  # tables that hold the readings of both load cells
-_PARABOLA = 3  # coefficients
+PARABOLA = 3  # coefficients
 STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 
 
@@ -107,7 +107,7 @@ class BenchError:
             loads: Loads of the whole table.
         """
         input_force, output_force = forces
-        smooth = smooth_readings(output_force, powers(input_force, _PARABOLA), group)
+        smooth = smooth_readings(output_force, powers(input_force, PARABOLA), group)
         read_input, changed = self.apply_to_cells(input_force, smooth, stroke, loads)
         return read_input, output_force + changed - smooth
 
@@ -212,8 +212,8 @@ class ErrorSource:
     """One cause of error.
 
     Args:
-        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear", "load exponent",
-            "compression", "zeros" or "crosstalk".
+        name: Name of the error: "wrap angles", "gain", "hysteresis", "wear", "load exponent", "compression", "zeros"
+            or "crosstalk".
         words: The same with how well it is known.
         steps: Small errors of the readings that stand for it, each with its standard uncertainty in such steps.
         cells: How many independent errors within the same limits add up to it: 2 for two load cells.

@@ -13,13 +13,7 @@ import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description.defaults import BenchErrors
 from bowdenfit.inference.bench_errors import LearnedErrors
-from bowdenfit.kinds.bench_error import (
-    BenchError,
-    BenchLoads,
-    ErrorSource,
-    iterate_error_sources,
-    order_of,
-)
+from bowdenfit.kinds.bench_error import BenchError, BenchLoads, ErrorSource, iterate_error_sources, order_of
 from bowdenfit.kinds.efficiencies.kind import EfficiencyKind, EfficiencyTable
 from bowdenfit.kinds.recordings.kind import RecordingKind
 from bowdenfit.models import build_model

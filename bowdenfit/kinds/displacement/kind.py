@@ -12,7 +12,7 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.bench_error import BenchError, powers, smooth_readings
+from bowdenfit.kinds.bench_error import PARABOLA, BenchError, powers, smooth_readings
 from bowdenfit.kinds.displacement.reader import find_early_rows, read_displacement
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, follow_motor
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
@@ -158,7 +158,7 @@ class DisplacementKind(
     def with_bench_error(self, table: DisplacementTable, error: BenchError) -> DisplacementTable:
         """Return the table with the error in its forces, which rise as the motor pulls, and in its wrap angles."""
         strokes = 2 * table.run + (table.motion.stroke > 0)
-        smooth = smooth_readings(table.force, powers(table.displacement, 3), strokes)
+        smooth = smooth_readings(table.force, powers(table.displacement, PARABOLA), strokes)
         force = table.force + error.apply_to_force(smooth, table.motion.stroke) - smooth
         return replace(table, force=force, own=error.apply_to_rows(table.own))
 
